@@ -76,6 +76,7 @@ mod study_solver;
 mod study_statistics;
 mod thread_count;
 mod tsai;
+mod unwritten;
 mod validate;
 mod validate_lenses;
 mod verb_examples;

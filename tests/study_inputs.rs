@@ -363,4 +363,5 @@ fn results_do_not_go_where_the_study_reads_from() {
         // A folder of its own, beside or below, is one.
         done(&own, "study run own.toml --out in/run");
     }
+    fs::remove_dir_all(folder).unwrap();
 }

@@ -278,6 +278,8 @@ fn command(verb: &Verb, disk: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
     command.args(verb.arguments).current_dir(disk).stdin(Stdio::null());
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    // What a killed verb leaves among the system's temporary files goes with the test's own.
+    command.env("TMPDIR", disk.parent().expect("it lies in the test's folder"));
     command
 }
 

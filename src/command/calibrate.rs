@@ -10,7 +10,6 @@ use calibench::io::table::columns;
 use calibench::io::{misplaced_marks, parse_corners};
 use calibench::photos::BoardSpec;
 use contradictions::Input;
-use failure::Failure;
 use observed::Observed;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +17,6 @@ mod advice;
 mod before_after;
 mod camera;
 mod contradictions;
-mod failure;
 mod finished;
 mod gallery;
 mod html;
@@ -50,22 +48,21 @@ pub(super) use plots::round_down;
 pub(super) fn run(arguments: &Arguments) -> Exit {
     let outcome = match (&arguments.board, &arguments.files[..]) {
         (Some(board), photos) => contradictions::refuse(arguments, Input::Photographs)
-            .map_err(Failure::from)
             .and_then(|()| photographs::run(arguments, board, photos)),
         (None, [file]) => from_table(arguments, file),
-        (None, files) => Err(Failure::from(format!(
+        (None, files) => Err(format!(
             "{} files but no --board: give one CSV file, or the board that the photographs show",
             files.len()
-        ))),
+        )),
     };
-    outcome.unwrap_or_else(|failure| {
-        warn(&failure.message);
-        failure.exit
+    outcome.unwrap_or_else(|message| {
+        warn(&message);
+        Exit::Usage
     })
 }
 
 /// Corners or point pairs, told apart by the names of their columns.
-fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
+fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, String> {
     if let Some(target) = &arguments.target {
         contradictions::refuse(arguments, Input::Measured)?;
         return measured::run(arguments, file, target);
@@ -122,8 +119,7 @@ pub(super) fn views_of(
 ) -> Result<Views, String> {
     if let Some(board) = board {
         let reading = photographs::Reading { image_size, memory, overlays: None };
-        let Observed { source, names, views, discs, notes, light, .. } =
-            reading.observe(board, files).map_err(|failure| failure.message)?;
+        let Observed { source, names, views, discs, notes, light, .. } = reading.observe(board, files)?;
         notes.iter().for_each(|note| warn(&format!("warning: {note}")));
         return Ok(Views { source, names, views, discs, light });
     }

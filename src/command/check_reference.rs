@@ -2,8 +2,9 @@
 //! measured again and again.
 
 use super::format::Format;
-use super::said::{MOST, number_that, positive, written_by};
-use super::{Exit, print, warn};
+use super::said::{MOST, number_that, positive, print_either, unless_unwritten, written_by};
+use super::terminal::has_arrived;
+use super::{Exit, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
 use calibench::io::lock::{lock, lock_of};
@@ -108,17 +109,32 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         ));
         return Exit::Usage;
     }
-    let judged = Judged::of(arguments, checks);
-    let json = format!("{:#}\n", judged.json(arguments));
-    if let Err(error) = write_files(arguments, (&history, &text), &json, &judged) {
+    // A check that was made must not be lost: it is written before anything is said of it.
+    if arguments.add.is_some()
+        && let Err(error) = write_atomically(&history, text.as_bytes())
+    {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
-    match arguments.format {
-        Format::Text => print(&judged.text(arguments)),
-        Format::Json => print(&json),
+    keep_files([arguments.history.as_path(), &history]);
+    let judged = Judged::of(arguments, checks);
+    let json = format!("{:#}\n", judged.json(arguments));
+    let written = arguments
+        .out
+        .as_ref()
+        .map_or(Ok(()), |folder| write_together(&files(arguments, folder, &json, &judged)));
+    print_either(arguments.format, &judged.text(arguments), &json);
+    let exit = if judged.first_alarm().is_some() { Exit::Deviates } else { Exit::Held };
+    let exit = unless_unwritten(written, exit);
+    // Who has not read that it is written adds it again.
+    if arguments.add.is_some() && (exit == Exit::Incomplete || !has_arrived()) {
+        warn(&format!(
+            "the check is number {} of {} now: do not add it again",
+            judged.checks.len(),
+            arguments.history.shown()
+        ));
     }
-    if judged.first_alarm().is_some() { Exit::Deviates } else { Exit::Held }
+    exit
 }
 
 /// Checks of a history: one a minute for two months. Each is kept, drawn and told.
@@ -130,7 +146,8 @@ const HEADER: &str = "when,value";
 /// The history's text, with the new check.
 fn with_new_check(arguments: &Arguments) -> Result<String, String> {
     let path = &arguments.history;
-    let mut text = if arguments.add.is_some() && !path.exists() {
+    let exists = path.try_exists().map_err(|error| format!("{}: {error}", path.shown()))?;
+    let mut text = if arguments.add.is_some() && !exists {
         format!("{HEADER}\n")
     } else {
         let bytes = read_regular(path, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
@@ -154,21 +171,11 @@ fn with_new_check(arguments: &Arguments) -> Result<String, String> {
     Ok(text)
 }
 
-/// The history is written first: a check that was made must not be lost.
-fn write_files(
-    arguments: &Arguments,
-    (history, text): (&Path, &str),
-    json: &str,
-    judged: &Judged,
-) -> std::io::Result<()> {
-    if arguments.add.is_some() {
-        write_atomically(history, text.as_bytes())?;
-    }
-    keep_files([arguments.history.as_path(), history]);
-    let Some(folder) = &arguments.out else { return Ok(()) };
+/// All or none, `check.json` last.
+fn files(arguments: &Arguments, folder: &Path, json: &str, judged: &Judged) -> [(PathBuf, Vec<u8>); 2] {
     let trend = judged.trend(arguments);
     let trend = (folder.join(trend.file_name()), trend.bytes);
-    write_together(&[trend, (folder.join("check.json"), json.as_bytes().to_vec())])
+    [trend, (folder.join("check.json"), json.as_bytes().to_vec())]
 }
 
 /// The checks under both rules.

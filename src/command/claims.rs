@@ -3,7 +3,8 @@
 //! paper.
 
 use super::format::Format;
-use super::{Exit, find, print, warn};
+use super::said::{print_either, unless_unwritten};
+use super::{Exit, find, warn};
 use calibench::io::write_atomically;
 use calibench_harness::{Build, Experiment, ProgressDisplay};
 use serde_json::{Value, json};
@@ -59,18 +60,10 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Bui
     };
     drop(progress);
     let text = as_markdown(&all, build);
-    if let Some(path) = &arguments.out
-        && let Err(error) = write_atomically(path, text.as_bytes())
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
-    }
-    match arguments.format {
-        Format::Text => print(&text),
-        Format::Json => print(&format!("{:#}\n", as_json(&all))),
-    }
+    let written = arguments.out.as_ref().map_or(Ok(()), |path| write_atomically(path, text.as_bytes()));
+    print_either(arguments.format, &text, &format!("{:#}\n", as_json(&all)));
     let held = all.iter().all(|shown| shown.claims.iter().all(|claim| claim.held));
-    if held { Exit::Held } else { Exit::Deviates }
+    unless_unwritten(written, if held { Exit::Held } else { Exit::Deviates })
 }
 
 /// Runs an experiment as a user would, and reads what it says.

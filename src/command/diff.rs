@@ -2,13 +2,13 @@
 
 use super::calibrate::{parse_size, round_down};
 use super::format::Format as Shown;
-use super::said::written_by;
-use super::{Exit, print, warn};
+use super::said::{print_either, unless_unwritten, written_by};
+use super::{Exit, warn};
 use calibench::camera::Model;
 use calibench::evaluate::{FrameDifference, TakenOut, difference::frame_nodes};
 use calibench::io::ShownPath;
 use calibench::io::formats::{CameraFile, FormatError, MOST_BYTES, Wishes, detect, read_camera_file};
-use calibench::io::{read_regular_text, significant, write_atomically};
+use calibench::io::{read_regular_text, significant, write_together};
 use calibench::validate::{Calibrated, OneCamera, frame_difference, one_camera};
 use calibench_harness::{Figure, HeatMap, Look, Plot};
 use clap::Args;
@@ -67,20 +67,14 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         }
     };
     let json = format!("{:#}\n", compared.json(arguments));
-    if let Some(folder) = &arguments.out
-        && let Err(error) = write_files(folder, &json, &compared)
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
-    }
-    match arguments.format {
-        Shown::Text => print(&compared.text(arguments)),
-        Shown::Json => print(&json),
-    }
-    match &compared.test {
+    let written =
+        arguments.out.as_ref().map_or(Ok(()), |folder| write_together(&files(folder, &json, &compared)));
+    print_either(arguments.format, &compared.text(arguments), &json);
+    let exit = match &compared.test {
         Ok(test) if test.p_value < arguments.rate && compared.doubts.is_empty() => Exit::Deviates,
         _ => Exit::Held,
-    }
+    };
+    unless_unwritten(written, exit)
 }
 
 /// What was found.
@@ -262,12 +256,11 @@ impl Compared {
     }
 }
 
-fn write_files(folder: &Path, json: &str, compared: &Compared) -> std::io::Result<()> {
-    write_atomically(&folder.join("difference.json"), json.as_bytes())?;
-    for figure in [Some(arrows(compared)), sizes(compared)].into_iter().flatten() {
-        write_atomically(&folder.join(figure.file_name()), &figure.bytes)?;
-    }
-    Ok(())
+/// All or none, `difference.json` last.
+fn files(folder: &Path, json: &str, compared: &Compared) -> Vec<(PathBuf, Vec<u8>)> {
+    let figures = [Some(arrows(compared)), sizes(compared)].into_iter().flatten();
+    let figures = figures.map(|figure| (folder.join(figure.file_name()), figure.bytes));
+    figures.chain([(folder.join("difference.json"), json.as_bytes().to_vec())]).collect()
 }
 
 /// Where pixels move.

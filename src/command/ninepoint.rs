@@ -2,9 +2,9 @@
 
 use super::calibrate::{Mode, PlaneReport, plane_text};
 use super::format::Format;
-use super::said::written_by;
+use super::said::{print_either, unless_unwritten, written_by};
 use super::source::last_part;
-use super::{Exit, print, warn};
+use super::{Exit, warn};
 use calibench::board::Board;
 use calibench::detect::{DotGrid, sparse_dots_of};
 use calibench::geometry::Vec2;
@@ -15,6 +15,7 @@ use calibench::photos::ordered_discs;
 use calibench::planar::{PlaneCalibration, calibrate_plane};
 use clap::Args;
 use serde_json::{Value, json};
+use std::io;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -74,17 +75,11 @@ fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
         calibrate_plane(arguments.mode.into(), &centres_px, &world).map_err(|error| at_file(&error))?;
     let found = Found { centres_px, world, plane };
     let json = format!("{:#}\n", result_json(arguments, &found));
-    if let Some(folder) = &arguments.out
-        && let Err(message) = write(folder, arguments, &found, &json, &overlay(&image.to_u8(), &grid))
-    {
-        warn(&message);
-        return Ok(Exit::Incomplete);
-    }
-    match arguments.format {
-        Format::Json => print(&json),
-        Format::Text => print(&text(&found)),
-    }
-    Ok(Exit::Held)
+    let overlay = || overlay(&image.to_u8(), &grid);
+    let written =
+        arguments.out.as_ref().map_or(Ok(()), |folder| write(folder, arguments, &found, &json, &overlay()));
+    print_either(arguments.format, &text(&found), &json);
+    Ok(unless_unwritten(written, Exit::Held))
 }
 
 /// The dots' world coordinates, row by row from the top left: one unit apart, the origin in the middle, y up.
@@ -153,7 +148,7 @@ fn write(
     found: &Found,
     json: &str,
     overlay: &Overlay,
-) -> Result<(), String> {
+) -> io::Result<()> {
     const OVERLAY: &str = "overlay.png";
     let names: Vec<String> = (1..=found.centres_px.len()).map(|dot| dot.to_string()).collect();
     let report = PlaneReport {
@@ -165,10 +160,10 @@ fn write(
         overlay: Some(OVERLAY),
     };
     let mut files: Vec<(PathBuf, Vec<u8>)> =
-        vec![(folder.join(OVERLAY), overlay.png().map_err(|error| error.to_string())?)];
+        vec![(folder.join(OVERLAY), overlay.png().map_err(io::Error::other)?)];
     files.extend(report.files().into_iter().map(|(name, bytes)| (folder.join(name), bytes)));
     files.push((folder.join("result.json"), json.as_bytes().to_vec()));
-    write_together(&files).map_err(|error| error.to_string())
+    write_together(&files)
 }
 
 #[cfg(test)]

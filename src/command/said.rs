@@ -6,6 +6,7 @@ use super::{Exit, print, warn};
 use calibench::io::corners::WEIGHTS;
 use calibench::io::write_atomically;
 use serde_json::{Value, json};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -15,7 +16,7 @@ pub(super) struct Said {
     pub json: Value,
 }
 
-/// Prints what was found in the form that was asked for, once its JSON stands in the folder.
+/// Prints what was found in the form that was asked for, and puts its JSON into the folder.
 pub(super) fn say(said: Result<Said, String>, out: Option<&Path>, file_name: &str, format: Format) -> Exit {
     let said = match said {
         Ok(said) => said,
@@ -25,17 +26,29 @@ pub(super) fn say(said: Result<Said, String>, out: Option<&Path>, file_name: &st
         }
     };
     let json = format!("{:#}\n", said.json);
-    if let Some(folder) = out
-        && let Err(error) = write_atomically(&folder.join(file_name), json.as_bytes())
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
+    let written = out.map_or(Ok(()), |folder| write_atomically(&folder.join(file_name), json.as_bytes()));
+    print_either(format, &said.text, &json);
+    unless_unwritten(written, Exit::Held)
+}
+
+/// Prints one of both forms.
+pub(super) fn print_either(format: Format, text: &str, json: &str) {
+    print(match format {
+        Format::Text => text,
+        Format::Json => json,
+    });
+}
+
+/// The exit of a verb that has printed what it found, whether or not its files could be written: what was
+/// computed is not lost with them.
+pub(super) fn unless_unwritten(written: io::Result<()>, exit: Exit) -> Exit {
+    match written {
+        Ok(()) => exit,
+        Err(error) => {
+            warn(&format!("{error}: what was found is on standard output only"));
+            Exit::Incomplete
+        }
     }
-    match format {
-        Format::Text => print(&said.text),
-        Format::Json => print(&json),
-    }
-    Exit::Held
 }
 
 /// The program, as it stands in what it writes.

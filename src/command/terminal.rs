@@ -41,6 +41,11 @@ pub(super) fn usage(error: &clap::Error) -> Exit {
     Exit::Held
 }
 
+/// Whether all that was printed so far has reached standard output, or a reader that had read enough.
+pub(super) fn has_arrived() -> bool {
+    LOST.get().is_none()
+}
+
 /// The exit of a run, which is incomplete if what it printed did not arrive.
 pub(super) fn ended(exit: Exit) -> Exit {
     let Some(why) = LOST.get() else { return exit };

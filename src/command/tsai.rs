@@ -4,7 +4,7 @@
 use super::calibrate::{parse_size, refuse_views_outside};
 use super::format::Format;
 use super::report::table;
-use super::said::{Said, number_that, ratio, say, written_by};
+use super::said::{Said, number_that, ratio, say, unless_unwritten, written_by};
 use super::source::unended;
 use super::{Exit, warn};
 use calibench::board::{View, ViewError};
@@ -88,13 +88,9 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         }
     };
     let said = Said { text: found.text(arguments), json: found.json(arguments) };
-    if let Some(folder) = &arguments.out
-        && let Err(error) = write_together(&found.files(folder, &said.json))
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
-    }
-    say(Ok(said), None, "tsai.json", arguments.format)
+    let files = arguments.out.as_ref().map(|folder| found.files(folder, &said.json));
+    let exit = say(Ok(said), None, "tsai.json", arguments.format);
+    unless_unwritten(files.map_or(Ok(()), |files| write_together(&files)), exit)
 }
 
 /// What was found of every view, and of all.

@@ -222,15 +222,18 @@ impl Recorded {
             Line::Whole(line) => (line, read_line(line)),
             Line::TooLong(beginning) => (beginning, Err(Breakage::TooLong { limit: MOST_LINE_BYTES })),
         };
-        if let Some((id, breakage)) = recorder::broken(line) {
-            self.answers.insert(id, Err(breakage));
-            return;
-        }
         // What a program writes before its first answer is no stray.
         if matches!(Greeting::read(line), Ok(Some(_))) {
             return;
         }
-        let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
+        let (id, answer) = match recorder::broken(line) {
+            Some((id, breakage)) => (Some(id), Err(breakage)),
+            None => {
+                let id =
+                    answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
+                (id, answer)
+            }
+        };
         match (id, answer) {
             (Some(id), _) if !asked.contains(&id) => {
                 self.stray

@@ -163,6 +163,10 @@ impl Folder {
 
     /// Without what a run that was killed left half written: the lock says that nobody is writing.
     fn cleaned(self) -> Result<Folder, FolderError> {
+        let figures = self.file("figures");
+        if figures.exists() && !figures.is_dir() {
+            return Err(FolderError::NoFolder(figures));
+        }
         for folder in [self.path.clone(), self.file("figures")] {
             remove_leftovers(&folder).map_err(FolderError::Unwritten)?;
         }

@@ -66,6 +66,9 @@ pub enum FolderError {
     /// Another process is at it.
     #[error("{path} is in use by another run: wait for it, or choose another folder", path = .0.shown())]
     InUse(PathBuf),
+    /// A file stands where a run puts a folder.
+    #[error("{path} is no folder, and a run has one of that name: choose another folder for the run", path = .0.shown())]
+    NoFolder(PathBuf),
     /// A manifest or checkpoint that cannot be read.
     #[error("{path} is damaged: {what}; begin again in another folder", path = path.shown())]
     Damaged {

@@ -172,10 +172,21 @@ impl Folder {
     pub(super) fn replay(&self, engine: &mut Engine) -> Result<Log, FolderError> {
         let path = self.file(TrialFile::Csv.name());
         let located = |cause| Located { path: path.clone(), cause };
+        let manifest = self.manifest()?;
+        let is_counted = self.file("checkpoint.json").exists();
+        // What is done is neither done again nor believed without what counts it.
+        if manifest.complete && !is_counted {
+            return Err(self.damaged("checkpoint.json", "it is missing, and the run was complete"));
+        }
+        if is_counted && !path.exists() {
+            return Err(
+                self.damaged(TrialFile::Csv.name(), "it is missing, and checkpoint.json counts its trials")
+            );
+        }
         let file = OpenOptions::new().append(true).create(true).open(&path).map_err(located)?;
-        let run = self.manifest()?.identity();
+        let run = manifest.identity();
         let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new(), run };
-        if !self.file("checkpoint.json").exists() {
+        if !is_counted {
             self.files.cut(&log.file, 0).map_err(located)?;
             self.append(&mut log, tables::header(&engine.quantities).as_bytes(), 0)?;
             return Ok(log);

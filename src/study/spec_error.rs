@@ -29,6 +29,9 @@ pub enum SpecError {
         /// Its domain.
         need: &'static str,
     },
+    /// Numbers with which nothing can be calculated.
+    #[error("scene.camera: {0}")]
+    Camera(String),
     /// A count with which nothing is done, nor kept.
     #[error("a whole number of the scene or the estimator is beyond {max}, the largest of TOML", max = i64::MAX)]
     NumberTooLarge,

@@ -60,6 +60,15 @@ pub fn write_together_to(files: &dyn Files, contents: &[(PathBuf, Vec<u8>)]) -> 
     beside.into_iter().try_for_each(Beside::place)
 }
 
+/// Refuses a place where a file could not be written, before the work whose result it is to take. The file's
+/// folder is made, and a file beside its place, which is removed.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn refuse_unwritable_place(path: &Path) -> io::Result<()> {
+    Beside::begin(&Disk, path).map(drop)
+}
+
 /// A file that is written beside its place, at once or piece by piece. It is removed unless it is put there.
 #[derive(Debug)]
 pub struct Beside<'a> {

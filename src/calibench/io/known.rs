@@ -264,8 +264,7 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
     let no_covariance = || KnownError::NoCovariance { file: file.into() };
     let covariance = covariance(free, &fields).ok_or_else(no_covariance)?;
     refuse_impossible(file, &covariance, &fields.views)?;
-    let sigma_px = fields.sigma_px.filter(|sigma| *sigma >= 0.0).ok_or_else(no_covariance)?;
-    refuse_no_noise(file, sigma_px, fields.degrees_of_freedom)?;
+    let sigma_px = noise_of(file, fields.sigma_px, fields.degrees_of_freedom)?;
     Ok(Known::Camera(Box::new(KnownCalibration {
         camera,
         image_size,
@@ -369,14 +368,18 @@ fn refuse_impossible(file: &str, covariance: &Covariance, views: &[ViewFields]) 
     Ok(())
 }
 
-/// Refuses a noise that no photograph has, or that nothing tells: the covariance is scaled by it.
-fn refuse_no_noise(file: &str, sigma_px: f64, degrees_of_freedom: usize) -> Result<(), KnownError> {
-    let what = if degrees_of_freedom == 0 {
-        "degrees_of_freedom: 0, so that nothing tells its noise, nor how well it is known".to_string()
-    } else if sigma_px > MOST_SIDE_PX as f64 {
-        format!("sigma_px: {sigma_px} px is wider than any image")
-    } else {
-        return Ok(());
+/// The noise by which the covariance is scaled; one that no photograph has, or that nothing tells, is refused.
+fn noise_of(file: &str, sigma_px: Option<f64>, degrees_of_freedom: usize) -> Result<f64, KnownError> {
+    let what = match sigma_px {
+        _ if degrees_of_freedom == 0 => {
+            "degrees_of_freedom: 0, so that nothing tells its noise, nor how well it is known".to_string()
+        }
+        None => "sigma_px: missing, and the covariance is scaled by it".to_string(),
+        Some(sigma_px) if sigma_px > MOST_SIDE_PX as f64 => {
+            format!("sigma_px: {sigma_px} px is wider than any image")
+        }
+        Some(sigma_px) if sigma_px >= 0.0 => return Ok(sigma_px),
+        Some(sigma_px) => format!("sigma_px: {sigma_px} px is no noise"),
     };
     Err(KnownError::Shape { file: file.into(), what })
 }
@@ -469,6 +472,10 @@ mod tests {
         assert_eq!(said(&|r| r["covariance"][0][0] = 1e308.into()), camera);
         assert!(said(&|r| r["degrees_of_freedom"] = 0.into()).unwrap_err().contains("degrees_of_freedom: 0"));
         assert!(said(&|r| r["sigma_px"] = 1e308.into()).unwrap_err().contains("wider than any image"));
+        assert!(
+            said(&|r| r["sigma_px"] = (-0.5).into()).unwrap_err().contains("sigma_px: -0.5 px is no noise")
+        );
+        assert!(said(&|r| r["sigma_px"].take()).unwrap_err().contains("sigma_px: missing"));
         assert_eq!(said(&|r| r["covariance"][0][1] = 1e9.into()), camera);
         assert_eq!(said(&|r| r["views"][1]["covariance_with_camera"][1][2] = 2e9.into()), view);
         assert_eq!(said(&|r| r["views"][1]["covariance"][4][3] = 0.0.into()), view);

@@ -62,12 +62,14 @@ impl Drop for Taken<'_> {
 }
 
 /// Units of bytes by their names.
-const UNITS: [(&str, u64); 6] = [
+const UNITS: [(&str, u64); 8] = [
     ("GiB", 1 << 30),
     ("MiB", 1 << 20),
+    ("KiB", 1 << 10),
     ("kiB", 1 << 10),
     ("GB", 1_000_000_000),
     ("MB", 1_000_000),
+    ("KB", 1000),
     ("kB", 1000),
 ];
 
@@ -79,9 +81,9 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let (number, unit) =
         UNITS.iter().find_map(|(name, bytes)| Some((text.strip_suffix(name)?, *bytes))).unwrap_or((text, 1));
     let bytes = number.trim().parse::<u64>().ok().and_then(|number| number.checked_mul(unit));
-    bytes
-        .filter(|bytes| *bytes > 0)
-        .ok_or_else(|| "expected a number of bytes, such as 2GiB or 500MB".to_string())
+    bytes.filter(|bytes| *bytes > 0).ok_or_else(|| {
+        "expected a whole number of bytes, or of kB, MB, GB, kiB, MiB or GiB, such as 500MB".to_string()
+    })
 }
 
 #[cfg(test)]
@@ -115,6 +117,7 @@ mod tests {
     fn bytes_are_read_with_their_units() {
         assert_eq!(parse_bytes("2GiB"), Ok(2 << 30));
         assert_eq!(parse_bytes("500 MB"), Ok(500_000_000));
+        assert_eq!(parse_bytes("100KB"), Ok(100_000));
         assert_eq!(parse_bytes("7"), Ok(7));
         for wrong in ["", "0", "-1", "2TB", "99999999999999GiB", "1.5GiB"] {
             assert!(parse_bytes(wrong).is_err(), "{wrong}");

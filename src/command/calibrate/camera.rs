@@ -1,10 +1,9 @@
 //! A camera from views, wherever they come from: the fit, how it is printed, and the files it leaves.
 
-use super::super::format::Format;
 use super::super::report::table;
-use super::super::{Exit, print, warn};
+use super::super::said::{print_either, unless_unwritten};
+use super::super::{Exit, warn};
 use super::before_after::BeforeAfter;
-use super::failure::Failure;
 use super::finished::{Finished, parameter_rows, summary, warnings, weakest};
 use super::models::{self, Comparison};
 use super::observed::Observed;
@@ -15,11 +14,13 @@ use super::view_names::ViewNames;
 use super::{advice, maps, page, plots, poses, scatter};
 use calibench::board::View;
 use calibench::calibrate::{Loss, ProfileInterval};
+use calibench::camera::{Camera, Lens};
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
 use calibench::io::formats::corner_text;
 use calibench::io::{
-    CalibrationFields, CornerFile, LeftOut, ShownPath, is_kept, message, significant, write_together,
+    CalibrationFields, CornerFile, LeftOut, ShownPath, implausible_value, is_kept, message, significant,
+    write_together,
 };
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
@@ -73,6 +74,16 @@ pub(crate) fn refuse_views_outside<'a>(
     refuse_marks_outside(source, image_size, &marks.collect::<Vec<_>>())
 }
 
+/// Numbers that no verb takes for a camera's are not told as one.
+pub(super) fn refuse_no_camera(source: &str, camera: &Camera<Lens>) -> Result<(), String> {
+    let odd = camera.values().find_map(|(parameter, value)| implausible_value(parameter, value));
+    odd.map_or(Ok(()), |reason| {
+        Err(format!(
+            "{source}: the cost falls towards what is no camera: {reason}; check the marks, and what is held"
+        ))
+    })
+}
+
 impl Observed {
     fn refuse_marks_outside(&self) -> Result<(), String> {
         let views = self.names.iter().zip(self.views.iter().map(View::pixels));
@@ -80,7 +91,7 @@ impl Observed {
     }
 }
 
-pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Failure> {
+pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, String> {
     observed.refuse_marks_outside()?;
     let mut settings = arguments.settings(observed.image_size);
     let comparison = match arguments.model {
@@ -91,6 +102,8 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
         Fitter { settings: &settings, discs: observed.discs.as_ref(), reject_factor: arguments.reject_views };
     let fit =
         fitter.fit(&observed.views).map_err(|error| format!("{}: {}", observed.source, message(&error)))?;
+    refuse_no_camera(&observed.source, &fit.calibration.camera)?;
+    let unwritten = observed.unwritten.clone();
     let mut finished = finish(observed, fit, arguments.pixel_pitch, settings.loss);
     finished.advice.extend(models::freedoms(&finished.fit, &settings));
     finished.comparison = comparison;
@@ -103,17 +116,21 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     fields.models = finished.comparison.iter().flat_map(|c| c.fields()).collect();
     fields.warnings = warnings(&finished);
     let json = finished.optics.with(&fields);
-    if let Some(folder) = &arguments.out {
-        write_files(folder, &json, &finished, arguments.memory()).map_err(Failure::unwritten)?;
-        of_earlier_runs(folder, &finished).iter().for_each(|file| {
-            warn(&format!("{} is of an earlier run, not of this result", folder.join(file).shown()));
-        });
-    }
-    match arguments.format {
-        Format::Json => print(&json),
-        Format::Text => print(&text(&finished)),
-    }
-    Ok(if finished.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
+    let written = arguments.out.as_ref().map_or(Ok(()), |folder| {
+        write_files(folder, &json, &finished, arguments.memory()).inspect(|()| {
+            of_earlier_runs(folder, &finished).iter().for_each(|file| {
+                warn(&format!("{} is of an earlier run, not of this result", folder.join(file).shown()));
+            });
+        })
+    });
+    print_either(arguments.format, &text(&finished), &json);
+    let exit = if finished.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete };
+    let exit = unless_unwritten(written, exit);
+    // The result and its page are whole without one of the pictures.
+    Ok(unwritten.map_or(exit, |error| {
+        warn(&error);
+        Exit::Incomplete
+    }))
 }
 
 fn finish(observed: Observed, fit: Fit, pixel_pitch_um: Option<f64>, loss: Loss) -> Finished {

@@ -1,10 +1,9 @@
 //! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target
 //! TARGET.csv`.
 
-use super::super::format::Format;
+use super::super::Exit;
+use super::super::said::{print_either, unless_unwritten};
 use super::super::source::unended;
-use super::super::{Exit, print};
-use super::failure::Failure;
 use super::measured_page;
 use super::measured_report::{Report, text};
 use super::optics::Optics;
@@ -18,7 +17,7 @@ use calibench::measured::{MeasuredCalibration, Noise, calibrate_measured};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Result<Exit, Failure> {
+pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Result<Exit, String> {
     let (target_name, target_bytes) = read(target)?;
     let (name, bytes) = read(corners)?;
     let measured = parse_target(&target_name, &target_bytes).map_err(|error| error.to_string())?;
@@ -27,6 +26,7 @@ pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Resul
     let noise = arguments.sigma.map_or(Noise::Estimated, |sigma_px| Noise::Known { sigma_px });
     let found = calibrate_measured(&measured, &seen.views, &arguments.settings(arguments.image_size), noise)
         .map_err(|error| format!("{name}: {}", refusal_by_names(&error, &seen.view_names)))?;
+    super::camera::refuse_no_camera(&name, &found.calibration.camera)?;
     let mut notes: Vec<String> = [(&target_name, &target_bytes), (&name, &bytes)]
         .into_iter()
         .filter_map(|(name, bytes)| unended(name, bytes))
@@ -42,14 +42,13 @@ pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Resul
     fields.calibration.warnings.extend(notes.iter().cloned());
     let json = optics.with(&fields);
     let report = Report { corners: name, target: target_name, found: &found, seen: &seen, optics, notes };
-    if let Some(folder) = &arguments.out {
-        write_together(&files(folder, &report, arguments.image_size, &json)).map_err(Failure::unwritten)?;
-    }
-    match arguments.format {
-        Format::Json => print(&json),
-        Format::Text => print(&text(&report)),
-    }
-    Ok(if found.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
+    let written = arguments
+        .out
+        .as_ref()
+        .map_or(Ok(()), |folder| write_together(&files(folder, &report, arguments.image_size, &json)));
+    print_either(arguments.format, &text(&report), &json);
+    let exit = if found.calibration.is_usable() { Exit::Held } else { Exit::Incomplete };
+    Ok(unless_unwritten(written, exit))
 }
 
 fn read(file: &Path) -> Result<(String, Vec<u8>), String> {

@@ -1,7 +1,6 @@
 //! Which lens model is to be taken, and which freedom explains what a fit leaves over?
 
 use super::super::report::table;
-use super::failure::Failure;
 use super::observed::Observed;
 use calibench::calibrate::{
     Board, Candidate, Compared, Freedom, LensCalibration, Loss, Settings, Warning, calibrate_lens,
@@ -20,12 +19,12 @@ pub(super) struct Comparison {
 }
 
 /// Compares the usual models before the board that is asked for, and gives the settings the chosen one.
-pub(super) fn compare(observed: &Observed, settings: &mut Settings) -> Result<Comparison, Failure> {
+pub(super) fn compare(observed: &Observed, settings: &mut Settings) -> Result<Comparison, String> {
     let candidates = usual(settings);
     let (compared, refused) = compare_models(&observed.views, settings, &candidates);
     let Some(chosen) = compared.first() else {
         let reason = refused.first().map(|(_, error)| message(error)).unwrap_or_default();
-        return Err(Failure::from(format!("{}: no lens model can be calibrated: {reason}", observed.source)));
+        return Err(format!("{}: no lens model can be calibrated: {reason}", observed.source));
     };
     *settings = chosen.candidate.settings(settings);
     let refused = refused.iter().map(|(c, error)| format!("{}: {}", name(c), message(error))).collect();

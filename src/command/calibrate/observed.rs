@@ -37,6 +37,8 @@ pub(super) struct Observed {
     pub(super) left_out_places: Vec<usize>,
     /// Pictures by their photographs' places: paths relative to the output folder.
     pub(super) overlays: BTreeMap<usize, String>,
+    /// Why one of these could not be written, the first of them.
+    pub(super) unwritten: Option<String>,
     /// What a reader must know about the input.
     pub(super) notes: Vec<String>,
 }

@@ -3,7 +3,6 @@
 
 use super::super::{Exit, warn};
 use super::camera;
-use super::failure::Failure;
 use super::observed::Observed;
 use super::options::Arguments;
 use calibench::board::{View, ViewError};
@@ -60,7 +59,7 @@ struct Seen {
     not_read: Vec<&'static str>,
 }
 
-pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
+pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, String> {
     let reading = Reading {
         image_size: arguments.image_size,
         memory: arguments.memory(),
@@ -86,7 +85,7 @@ impl Reading<'_> {
         &self,
         board: &BoardSpec,
         photos: &[PathBuf],
-    ) -> Result<Observed, Failure> {
+    ) -> Result<Observed, String> {
         let memory = Memory::new(self.memory);
         let seen = each(photos, |index, path| {
             let extent = image_extent(path)?;
@@ -101,7 +100,7 @@ impl Reading<'_> {
             warn(&format!("left out: {name}: {reason}"));
         }
         if observed.views.is_empty() {
-            return Err(format!("none of {} photographs shows the {board}", photos.len()).into());
+            return Err(format!("none of {} photographs shows the {board}", photos.len()));
         }
         Ok(observed)
     }
@@ -200,7 +199,7 @@ fn observed(
     board: &BoardSpec,
     photos: &[PathBuf],
     seen: Vec<Result<Seen, ImageError>>,
-) -> Result<Observed, Failure> {
+) -> Result<Observed, String> {
     let expected = match image_size {
         Some(size) => Some((size, "--image-size has".to_string())),
         None => ruling_size(&seen)?,
@@ -227,7 +226,10 @@ fn observed(
     for (place, (path, seen)) in photos.iter().zip(seen).enumerate() {
         let name = path.shown();
         if let Some(overlay) = seen.as_ref().ok().and_then(|seen| seen.overlay.clone()) {
-            observed.overlays.insert(place, overlay.map_err(Failure::unwritten)?);
+            match overlay {
+                Ok(file) => _ = observed.overlays.insert(place, file),
+                Err(error) => _ = observed.unwritten.get_or_insert(error),
+            }
         }
         let light = seen.as_ref().map_or(0.0, |seen| seen.light);
         let board = seen.as_ref().ok().and_then(|seen| seen.marks.as_ref().ok());

@@ -1,10 +1,9 @@
 //! A map of a plane from a file of point pairs.
 
-use super::super::format::Format;
+use super::super::Exit;
 use super::super::report::table;
+use super::super::said::{print_either, unless_unwritten};
 use super::super::source::last_part;
-use super::super::{Exit, print};
-use super::failure::Failure;
 use super::options::{Arguments, Mode};
 use super::plane_page::PlaneReport;
 use calibench::geometry::Vec2;
@@ -12,32 +11,25 @@ use calibench::io::{PointPairs, parse_point_pairs, significant, write_together};
 use calibench::planar::{PlaneCalibration, calibrate_plane};
 use std::path::{Path, PathBuf};
 
-pub(super) fn run(arguments: &Arguments, file: &str, bytes: &[u8]) -> Result<Exit, Failure> {
+pub(super) fn run(arguments: &Arguments, file: &str, bytes: &[u8]) -> Result<Exit, String> {
     let PointPairs { names, pixels, world } =
         parse_point_pairs(file, bytes).map_err(|error| error.to_string())?;
     let mode = arguments.mode.unwrap_or(Mode::Planar);
     let result = calibrate_plane(mode.into(), &pixels, &world).map_err(|error| format!("{file}: {error}"))?;
     let json = plane_json(mode, &pixels, &world, &result);
-    if let Some(folder) = &arguments.out {
-        let title = last_part(Path::new(file));
-        let report = PlaneReport {
-            title,
-            names: &names,
-            pixels: &pixels,
-            world: &world,
-            plane: &result,
-            overlay: None,
-        };
-        let mut files: Vec<(PathBuf, Vec<u8>)> =
-            report.files().into_iter().map(|(name, bytes)| (folder.join(name), bytes)).collect();
-        files.push((folder.join("result.json"), json.clone().into_bytes()));
-        write_together(&files).map_err(Failure::unwritten)?;
-    }
-    match arguments.format {
-        Format::Json => print(&json),
-        Format::Text => print(&plane_text(&result)),
-    }
-    Ok(Exit::Held)
+    let title = last_part(Path::new(file));
+    let report =
+        PlaneReport { title, names: &names, pixels: &pixels, world: &world, plane: &result, overlay: None };
+    let written =
+        arguments.out.as_ref().map_or(Ok(()), |folder| write_together(&files(folder, &report, &json)));
+    print_either(arguments.format, &plane_text(&result), &json);
+    Ok(unless_unwritten(written, Exit::Held))
+}
+
+/// All or none, `result.json` last.
+fn files(folder: &Path, report: &PlaneReport<'_>, json: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let files = report.files().into_iter().map(|(name, bytes)| (folder.join(name), bytes));
+    files.chain([(folder.join("result.json"), json.as_bytes().to_vec())]).collect()
 }
 
 fn plane_json(mode: Mode, pixels: &[Vec2], world: &[Vec2], result: &PlaneCalibration) -> String {

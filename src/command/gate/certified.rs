@@ -2,7 +2,7 @@
 
 use super::super::said::number_that;
 use super::super::{Exit, print, warn};
-use super::options::Copies;
+use super::options::{Copies, refuse_unwritable};
 use super::{Stop, incomplete, usage};
 use calibench::io::ShownPath;
 use calibench::io::input::MOST_SPEC_BYTES;
@@ -127,6 +127,7 @@ fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) ->
 fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> Result<Exit, Stop> {
     let project = Project::find().map_err(usage)?;
     std::env::set_current_dir(project.root()).map_err(incomplete)?;
+    refuse_unwritable(path)?;
     let problems = chosen(arguments)?;
     let mut table = DigitsTable::default();
     table.add("calibench, polished", &problems, &measure(&problems, &Polished));

@@ -3,10 +3,10 @@
 
 use super::options::{Copies, Judgement, Problems, Reports};
 use super::verdict::{keep_recorded, recorded};
-use super::{Stop, incomplete, usage};
-use crate::{Exit, print, program};
+use super::{Stop, usage};
+use crate::{Exit, program};
 use calibench::camera::Model;
-use calibench::io::{ShownPath, write_atomically};
+use calibench::io::ShownPath;
 use calibench_gate::paired::{self, Paired};
 use calibench_gate::{Asked, Builtin, Plan, Report, Solver};
 use calibench_harness::ProgressDisplay;
@@ -104,11 +104,7 @@ impl Against<'_> {
             (&other.name(), &old, &old_checks),
             terms.false_alarm_rate,
         );
-        if let Some(path) = &self.reports.told.json {
-            write_atomically(path, paired.to_json().as_bytes()).map_err(incomplete)?;
-        }
-        print(&paired.to_text());
-        Ok(if paired.held() { Exit::Held } else { Exit::Deviates })
+        Ok(self.reports.told.tell(&paired.to_json(), &paired.to_text(), paired.held()))
     }
 }
 

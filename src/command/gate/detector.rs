@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     let kinds = if arguments.boards.is_empty() { &Kind::ALL[..] } else { &arguments.boards };
     let report =
         judge(detector.as_mut(), kinds, amount.seed, photos, false_alarms.rate).map_err(incomplete)?;
-    told.tell(&report.to_json(), &report.to_text(), report.trusted)
+    Ok(told.tell(&report.to_json(), &report.to_text(), report.trusted))
 }
 
 /// A kind of board by its name.

@@ -1,7 +1,7 @@
 //! `calibench gate hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
 
 use super::super::{Exit, print, warn};
-use super::options::OwnKind;
+use super::options::{OwnKind, refuse_unwritable};
 use super::{Stop, incomplete, usage};
 use calibench::io::write_atomically;
 use calibench_gate::{THOROUGH, Terms};
@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
         None => Box::new(Builtin),
     };
     let report = judged(&arguments.own, solver.as_mut())?;
-    arguments.own.told.tell(&report.to_json(), &report.to_text(), report.trusted)
+    Ok(arguments.own.told.tell(&report.to_json(), &report.to_text(), report.trusted))
 }
 
 fn judged(own: &OwnKind, solver: &mut dyn Solver) -> Result<Report, Stop> {
@@ -75,6 +75,7 @@ How large are the errors of X, in terms of the Cramer-Rao bound, and what does n
 fn write_table(own: &OwnKind, path: &Path, timeout: Duration) -> Result<Exit, Stop> {
     let project = calibench_harness::project::Project::find().map_err(usage)?;
     std::env::set_current_dir(project.root()).map_err(incomplete)?;
+    refuse_unwritable(path)?;
     let ours = judged(own, &mut Builtin)?;
     let mut text = format!("{TABLE_HEAD}\n{}\n{}\n", ours.head(), ours.to_row("calibench"));
     for (name, command) in METHODS {

@@ -1,10 +1,11 @@
 //! Options that several ways of judging share, a group each.
 
 use super::super::format::Format;
-use super::super::said::{refuse_standard_output, whole};
-use super::super::{Exit, print, program};
+use super::super::said::{print_either, refuse_standard_output, unless_unwritten, whole};
+use super::super::{Exit, program};
 use super::{Stop, incomplete, usage};
 use calibench::camera::Model;
+use calibench::io::atomic::refuse_unwritable_place;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::{Allowance, Asked, EXPECTED_FALSE_ALARMS, Plan, PlanError, Property, Solver, Terms};
 use std::path::{Path, PathBuf};
@@ -208,21 +209,16 @@ pub(super) struct Told {
 }
 
 impl Told {
-    /// Refuses a name that is none of a file.
+    /// Refuses where no file can be written.
     fn check(&self) -> Result<(), Stop> {
-        self.json.as_deref().map_or(Ok(()), refuse_standard_output).map_err(usage)
+        self.json.as_deref().map_or(Ok(()), refuse_unwritable)
     }
 
-    /// JSON where it is wanted, and the answer in the form that is asked for.
-    pub fn tell(&self, json: &str, text: &str, trusted: bool) -> Result<Exit, Stop> {
-        if let Some(path) = &self.json {
-            write_atomically(path, json.as_bytes()).map_err(incomplete)?;
-        }
-        print(match self.format {
-            Format::Text => text,
-            Format::Json => json,
-        });
-        Ok(if trusted { Exit::Held } else { Exit::Deviates })
+    /// The answer in the form that is asked for, and JSON where it is wanted.
+    pub fn tell(&self, json: &str, text: &str, trusted: bool) -> Exit {
+        print_either(self.format, text, json);
+        let written = self.json.as_ref().map_or(Ok(()), |path| write_atomically(path, json.as_bytes()));
+        unless_unwritten(written, if trusted { Exit::Held } else { Exit::Deviates })
     }
 }
 
@@ -239,13 +235,13 @@ pub(super) struct Reports {
 }
 
 impl Reports {
-    /// Refuses names that are none of a file, and two reports in one file, of which the last would be left.
+    /// Refuses where no file can be written, and two reports in one file, of which the last would be left.
     pub fn check(&self) -> Result<(), Stop> {
         let reports = [("--json", &self.told.json), ("--junit", &self.junit), ("--html", &self.html)];
         let mut named: Vec<(&str, PathBuf)> = Vec::new();
         for (option, path) in reports {
             let Some(path) = path else { continue };
-            refuse_standard_output(path).map_err(usage)?;
+            refuse_unwritable(path)?;
             let place = place_of(path);
             if let Some((other, _)) = named.iter().find(|(_, known)| *known == place) {
                 return Err(usage(format!(
@@ -257,6 +253,12 @@ impl Reports {
         }
         Ok(())
     }
+}
+
+/// Refuses a place where no file can be written: a solver may take hours, and its report must not be lost then.
+pub(super) fn refuse_unwritable(path: &Path) -> Result<(), Stop> {
+    refuse_standard_output(path).map_err(usage)?;
+    refuse_unwritable_place(path).map_err(usage)
 }
 
 /// Where a file that is written would stand, by whatever way it is named.

@@ -1,6 +1,6 @@
 //! `calibench gate power`: the gate's own power and false alarms, as committed tables.
 
-use super::options::Amount;
+use super::options::{Amount, refuse_unwritable};
 use super::{Stop, incomplete, usage};
 use crate::{Exit, print, warn};
 use calibench::io::write_atomically;
@@ -37,6 +37,7 @@ pub(super) struct TableArguments {
 /// deviates.
 pub(super) fn measure(Arguments { folder, amount }: &Arguments, build: &Build) -> Result<Exit, Stop> {
     let started = Instant::now();
+    refuse_unwritable(&folder.join("faults.csv"))?;
     let samples = amount.samples([QUICK, THOROUGH], plan::MOST_SAMPLES)?;
     let seed = amount.seed;
     let sizes = Sizes {

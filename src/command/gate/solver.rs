@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     let plan = arguments.problems.plan(|| solver.models())?;
     match &arguments.record {
         Some(folder) => record(arguments, &plan, solver.as_ref(), folder, build),
-        None => told(&arguments.reports, &report(arguments, &plan, solver.as_ref(), build)?),
+        None => Ok(told(&arguments.reports, &report(arguments, &plan, solver.as_ref(), build)?)),
     }
 }
 
@@ -104,7 +104,7 @@ fn record(
     let report = report(arguments, plan, &recorder, build)?;
     // Before the report: where that cannot be written the answers are kept.
     files::file_answers(plan, folder, &recorder).map_err(of_files)?;
-    let exit = told(&arguments.reports, &report)?;
+    let exit = told(&arguments.reports, &report);
     // The report is the one object on standard output.
     if arguments.reports.told.format == Format::Text {
         print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.shown()));

@@ -1,10 +1,11 @@
 //! A solver's report, taken and told: of one that is asked now, or of answers in a folder.
 
 use super::super::format::Format;
+use super::super::said::unless_unwritten;
 use super::super::terminal::warn_lines;
 use super::super::{Exit, print, warn};
 use super::options::{Judgement, Reports};
-use super::{Stop, incomplete, of_files};
+use super::{Stop, of_files};
 use calibench::io::{ShownPath, keep_files, write_atomically};
 use calibench_gate::files::{self, Recorded};
 use calibench_gate::{Plan, Report, Solver};
@@ -33,18 +34,8 @@ pub(super) fn asked(
 /// A report in one form, and where it goes if it is wanted.
 type Output<'a> = (&'a Option<PathBuf>, fn(&Report) -> String);
 
-/// Tells what a report says, in all forms that are asked for.
-pub(super) fn told(reports: &Reports, report: &Report) -> Result<Exit, Stop> {
-    let outputs: [Output<'_>; 3] = [
-        (&reports.told.json, Report::to_json),
-        (&reports.junit, Report::to_junit),
-        (&reports.html, Report::to_html),
-    ];
-    for (path, text) in outputs {
-        if let Some(path) = path {
-            write_atomically(path, text(report).as_bytes()).map_err(incomplete)?;
-        }
-    }
+/// Tells what a report says, in all forms that are asked for: where one cannot be written, the others are.
+pub(super) fn told(reports: &Reports, report: &Report) -> Exit {
     match reports.told.format {
         Format::Text => print(&report.to_text(columns())),
         Format::Json => print(&report.to_json()),
@@ -52,7 +43,16 @@ pub(super) fn told(reports: &Reports, report: &Report) -> Result<Exit, Stop> {
     if !report.held() {
         warn_lines(&report.details());
     }
-    Ok(if report.held() { Exit::Held } else { Exit::Deviates })
+    let outputs: [Output<'_>; 3] = [
+        (&reports.told.json, Report::to_json),
+        (&reports.junit, Report::to_junit),
+        (&reports.html, Report::to_html),
+    ];
+    let exit = if report.held() { Exit::Held } else { Exit::Deviates };
+    outputs.into_iter().fold(exit, |exit, (path, text)| match path {
+        Some(path) => unless_unwritten(write_atomically(path, text(report).as_bytes()), exit),
+        None => exit,
+    })
 }
 
 /// Problems and answers of a folder, with a word on what in it answers none of them.
