@@ -101,3 +101,58 @@ fn guessed(problem: &Problem) -> Answer {
     given.covariance = Some(AnswerCovariance { parameters: problem.free.clone(), matrix });
     given
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{asked_of, with_fault};
+    use super::*;
+
+    #[test]
+    fn the_principal_point_is_held_at_the_middle_pixel() {
+        let answer = with_fault("centred-principal-point", &asked_of("four-pose"));
+        assert_eq!(["cx", "cy"].map(|name| answer.parameters[name]), [319.5, 239.5]);
+    }
+
+    #[test]
+    fn held_values_are_replaced_by_the_image_centre_and_by_no_distortion() {
+        let (problem, names) = (asked_of("held"), ["cx", "cy", "k2"]);
+        assert!(names.iter().all(|name| ![319.5, 239.5, 0.0].contains(&problem.held[*name])));
+        let answer = with_fault("held-values-ignored", &problem);
+        assert_eq!(names.map(|name| answer.parameters[name]), [319.5, 239.5, 0.0]);
+    }
+
+    #[test]
+    fn the_one_focal_length_lies_half_way_between_the_two() {
+        let problem = asked_of("non-square");
+        let (right, found) = (correct(&problem).parameters, with_fault("fx-equals-fy", &problem).parameters);
+        assert!(right["fx"] > right["fy"] + 100.0);
+        assert_eq!(found["fx"], found["fy"]);
+        assert!((right["fx"] - found["fx"] - (found["fy"] - right["fy"])).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn who_stops_early_leaves_out_the_first_step_that_is_small() {
+        let problem = asked_of("strong-distortion");
+        let fx = |most| iterations(&problem, most).parameters["fx"];
+        let found = stopped_early(&problem).parameters["fx"];
+        let steps = (0..20).position(|most| fx(most) == found).unwrap();
+        let change = |step: usize| (fx(step) / fx(step - 1) - 1.0).abs();
+        assert!(steps > 0 && (1..=steps).all(|step| change(step) >= 1e-3), "{steps}");
+        // Small, and yet more than a thousandth of a pixel.
+        assert!((1e-3 / found..1e-3).contains(&change(steps + 1)), "{steps}: {}", change(steps + 1));
+    }
+
+    #[test]
+    fn facing_views_are_given_the_image_width_as_focal_length_and_little_doubt() {
+        let problem = asked_of("three-parallel-views");
+        assert_ne!(correct(&problem).status, Status::Ok);
+        let answer = with_fault("facing-views-accepted", &problem);
+        assert_eq!((answer.status, answer.warnings.len()), (Status::Ok, 0));
+        assert_eq!(["fx", "fy"].map(|name| answer.parameters[name]), [640.0; 2]);
+        let stated = answer.covariance.unwrap();
+        assert_eq!(stated.parameters, problem.free);
+        for (i, row) in stated.matrix.iter().enumerate() {
+            assert!(row.iter().enumerate().all(|(j, x)| *x == if i == j { 0.1 } else { 0.0 }));
+        }
+    }
+}

@@ -121,3 +121,31 @@ fn mended(problem: &Problem) -> Answer {
     given.pose_covariances = None;
     given
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{asked_of, with_fault};
+    use super::*;
+
+    #[test]
+    fn a_target_is_rounded_to_thousandths_before_it_is_used() {
+        let exact = asked_of("four-pose");
+        let mut problem = exact.clone();
+        problem.views.iter_mut().flat_map(|view| view.target.iter_mut().flatten()).for_each(|x| *x += 4e-4);
+        assert_ne!(correct(&problem), correct(&exact));
+        assert_eq!(with_fault("target-rounded", &problem), correct(&exact));
+    }
+
+    #[test]
+    fn the_image_centre_is_taken_from_a_principal_point_that_is_estimated() {
+        let problem = asked_of("four-pose");
+        let value = |answer: &Answer, name: &str| answer.parameters[name];
+        let (right, found) = (correct(&problem), with_fault("image-centre-offset", &problem));
+        // The middle pixel of 640 by 480.
+        assert_eq!(value(&found, "cx"), value(&right, "cx") - 319.5);
+        assert_eq!(value(&found, "cy"), value(&right, "cy") - 239.5);
+        assert_eq!(value(&found, "fx"), value(&right, "fx"));
+        let held = asked_of("held");
+        assert_eq!(with_fault("image-centre-offset", &held), correct(&held));
+    }
+}

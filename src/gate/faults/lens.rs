@@ -95,3 +95,32 @@ fn far_out_dropped(problem: &Problem) -> Answer {
     }
     correct(&changed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::asked_of;
+    use super::*;
+
+    #[test]
+    fn marks_within_a_sixth_of_the_image_from_its_edges_are_not_used() {
+        let problem = asked_of("four-pose");
+        let mut near = problem.clone();
+        for view in &mut near.views {
+            // Of 640 by 480 the sixths end at these.
+            let is_used =
+                |[u, v]: [f64; 2]| (640.0 / 6.0..3200.0 / 6.0).contains(&u) && (80.0..400.0).contains(&v);
+            let pairs = view.target.iter().zip(&view.pixels).filter(|(_, pixel)| is_used(**pixel));
+            (view.target, view.pixels) = pairs.map(|(t, p)| (*t, *p)).unzip();
+        }
+        assert!(near.points() < problem.points() && near.views.iter().all(|view| view.pixels.len() >= 8));
+        assert_eq!(far_out_dropped(&problem), correct(&near));
+    }
+
+    #[test]
+    fn the_last_free_coefficient_is_held_at_zero_and_no_other() {
+        let problem = asked_of("four-pose");
+        let answer = with_settings(&problem, without_last_coefficient);
+        assert_eq!(answer.parameters["k2"], 0.0);
+        assert!(answer.parameters["k1"] < -0.1);
+    }
+}

@@ -184,7 +184,18 @@ fn mixed(bytes: impl Iterator<Item = u8>) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::{Case, Plan, Purpose};
+    use crate::plan::{Asked, Case, Plan, Purpose};
+
+    /// The first sample of a scene, or its problem where it is bad input.
+    pub(super) fn asked_of(scene: &str) -> Problem {
+        let plan = Plan::of(1, 1, Asked { scenes: vec![scene.into()], ..Asked::default() }).unwrap();
+        plan.problem(plan.cases.iter().find(|case| case.purpose != Purpose::Exact).unwrap())
+    }
+
+    /// What a solver with this fault answers at first.
+    pub(super) fn with_fault(id: &str, problem: &Problem) -> Answer {
+        Faulty::new(planted().into_iter().find(|fault| fault.id == id).unwrap()).ask(problem).unwrap()
+    }
 
     #[test]
     fn there_are_enough_faults_and_each_has_its_name() {
@@ -211,5 +222,39 @@ mod tests {
         }
         // Four views of 63 marks, six parameters.
         assert_eq!(plan.scenarios[0].degrees_of_freedom(), 2 * 252 - 6 - 24);
+    }
+
+    #[test]
+    fn the_last_bit_of_fx_changes_with_every_time_that_a_problem_is_asked() {
+        let faulty = Faulty::new(planted().into_iter().find(|fault| fault.id == "last-bits").unwrap());
+        let plan = Plan::of(1, 4, Asked { scenes: vec!["four-pose".into()], ..Asked::default() }).unwrap();
+        for case in plan.cases.iter().filter(|case| case.purpose == Purpose::Sample) {
+            let problem = plan.problem(case);
+            let bits = |solver: &dyn Solver| solver.ask(&problem).unwrap().parameters["fx"].to_bits();
+            let right = bits(&Builtin);
+            assert_eq!([(); 3].map(|()| bits(&faulty) ^ right), [0, 1, 0]);
+        }
+    }
+
+    #[test]
+    fn a_fault_is_looked_for_on_the_scenes_of_its_lenses() {
+        let lenses =
+            |id: &str| Faulty::new(planted().into_iter().find(|fault| fault.id == id).unwrap()).models();
+        assert_eq!(lenses("biased-fx"), [Model::BrownConrady]);
+        assert_eq!(lenses("another-lens"), [Model::KannalaBrandt]);
+        assert_eq!(lenses("marks-far-out-dropped"), Model::ALL[1..]);
+    }
+
+    #[test]
+    fn what_is_held_by_fault_is_stated_with_the_right_covariance_and_all_else_with_its_own() {
+        let problem = asked_of("four-pose");
+        let right = correct(&problem);
+        let held = with_fault("k2-ignored", &problem);
+        assert_eq!(held.parameters["k2"], 0.0);
+        assert_eq!(
+            (held.covariance, held.pose_covariances),
+            (right.covariance.clone(), right.pose_covariances)
+        );
+        assert_ne!(with_fault("no-refinement", &problem).covariance, right.covariance);
     }
 }

@@ -99,9 +99,11 @@ fn deviation(answer: &Answer, name: &str) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Faulty, planted};
+    use super::super::tests::{asked_of, with_fault};
+    use super::super::{Faulty, correct, planted};
     use super::*;
     use crate::plan::{Asked, Plan};
+    use crate::protocol::{AnswerCovariance, Status};
     use crate::solver::{Builtin, Solver};
 
     #[test]
@@ -115,5 +117,74 @@ mod tests {
             let fx = |solver: &dyn Solver| solver.ask(&problem).unwrap().parameters["fx"];
             assert_eq!(fx(&faulty), factor * fx(&Builtin));
         }
+    }
+
+    #[test]
+    fn the_layout_and_units_of_an_answer_are_changed_as_named() {
+        let problem = asked_of("four-pose");
+        let right = correct(&problem);
+        let value = |fault: &str, name: &str| with_fault(fault, &problem).parameters[name];
+        assert_eq!(value("fy-cx-swapped", "fy"), right.parameters["cx"]);
+        assert_eq!(value("fy-cx-swapped", "cx"), right.parameters["fy"]);
+        assert_eq!(value("half-pixel-shift", "cy"), right.parameters["cy"] + 0.5);
+        let poses = |answer: Answer| answer.poses.unwrap();
+        for (pose, right) in
+            poses(with_fault("translation-in-metres", &problem)).iter().zip(poses(right.clone()))
+        {
+            assert_eq!(pose.translation, right.translation.map(|x| x / 1000.0));
+        }
+        let turned = poses(with_fault("rotation-transposed", &problem));
+        assert_eq!(turned[3].rotation[0][2], poses(right)[3].rotation[2][0]);
+    }
+
+    #[test]
+    fn what_is_held_is_not_exchanged_or_shifted() {
+        let problem = asked_of("held");
+        for fault in ["fy-cx-swapped", "half-pixel-shift", "inverse-distortion", "p1-p2-swapped"] {
+            assert_eq!(with_fault(fault, &problem), correct(&problem), "{fault}");
+        }
+    }
+
+    #[test]
+    fn an_rmse_is_divided_by_coordinates_or_by_degrees_of_freedom() {
+        let problem = asked_of("four-pose");
+        let square = |answer: Answer| answer.rmse.map(|rmse| rmse * rmse).unwrap();
+        // Four views of 63 marks, six parameters.
+        let sum = 252.0 * square(correct(&problem));
+        for (fault, divisor) in [("rmse-per-coordinate", 504.0), ("rmse-by-freedom", 474.0)] {
+            let found = square(with_fault(fault, &problem));
+            assert!((found * divisor / sum - 1.0).abs() < 1e-12, "{fault}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_inverse_distortion_undoes_the_lens_to_fourth_order() {
+        let problem = asked_of("four-pose");
+        let mut answer = correct(&problem);
+        let lens = |answer: &Answer, r: f64| {
+            let [k1, k2] = ["k1", "k2"].map(|name| answer.parameters[name]);
+            r * (1.0 + k1 * r * r + k2 * r * r * r * r)
+        };
+        let distorted = lens(&answer, 0.05);
+        inverse_distortion(&problem, &mut answer);
+        // The sixth order is 1e-9; a coefficient of the fourth wrong by a hundredth would be 3e-9.
+        let left = lens(&answer, distorted) - 0.05;
+        assert!(left.abs() < 1e-9, "{left}");
+    }
+
+    #[test]
+    fn the_bias_is_a_tenth_of_the_stated_deviation() {
+        let answer = Answer {
+            covariance: Some(AnswerCovariance {
+                parameters: ["cx", "fx"].map(String::from).to_vec(),
+                matrix: vec![vec![4.0, 1.0], vec![1.0, 9.0]],
+            }),
+            ..Answer::without_estimate("a", Status::Ok, "")
+        };
+        assert_eq!(["fx", "cx", "k1"].map(|name| deviation(&answer, name)), [3.0, 2.0, 0.0]);
+        let problem = asked_of("four-pose");
+        let right = correct(&problem);
+        let moved = with_fault("biased-fx", &problem).parameters["fx"] - right.parameters["fx"];
+        assert!((moved / deviation(&right, "fx") - 0.1).abs() < 1e-9, "{moved}");
     }
 }

@@ -49,3 +49,28 @@ pub(super) const FAULTS: &[Planted] = &[
         },
     ),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{asked_of, with_fault};
+
+    #[test]
+    fn who_warns_of_everything_answers_rightly_where_it_can_and_confidently_where_it_cannot() {
+        let (good, bad) = (asked_of("four-pose"), asked_of("one-facing-view"));
+        let warned = |problem| with_fault("warns-of-everything", problem);
+        assert_eq!(warned(&good).parameters, super::correct(&good).parameters);
+        assert!(warned(&bad).standard_deviations.unwrap().values().all(|sd| *sd == 1e-3));
+        for answer in [warned(&good), warned(&bad)] {
+            assert_eq!(answer.status, super::Status::Ok);
+            assert!(answer.warnings.iter().any(|warning| warning == "use with care"));
+        }
+    }
+
+    #[test]
+    fn the_last_pose_is_missing_and_no_other() {
+        let problem = asked_of("four-pose");
+        let (all, stated) =
+            (super::correct(&problem).poses, with_fault("a-pose-missing", &problem).poses.unwrap());
+        assert_eq!(stated, all.unwrap()[..3]);
+    }
+}

@@ -242,6 +242,7 @@ mod tests {
     use super::*;
     use crate::plan::{Case, Plan, Purpose};
     use crate::protocol::{AnswerCovariance, Status};
+    use calibench::synth::{Stream, StreamKey, Truth};
 
     /// fx = 600 +- 2 and k1 = -0.2 +- 3, of covariance 1.
     fn answer() -> Answer {
@@ -278,5 +279,172 @@ mod tests {
                 assert_eq!(stated[i][j], if j >= i { right[i][j] } else { 0.0 });
             }
         }
+    }
+
+    /// One view of `target` from a distance of 1 by a pinhole of 600 px, each mark displaced as `by` says, and
+    /// an answer that states the camera and the pose without error.
+    fn facing(target: &[[f64; 2]], mut by: impl FnMut(usize) -> [f64; 2]) -> (Problem, Answer) {
+        let pixel = |(i, [x, y]): (usize, &[f64; 2])| [600.0 * x + by(i)[0], 600.0 * y + by(i)[1]];
+        let pixels = target.iter().enumerate().map(pixel).collect();
+        let problem = Problem {
+            id: "a".into(),
+            image_size: [640, 480],
+            model: "brown-conrady".into(),
+            views: vec![ProblemView { target: target.to_vec(), pixels }],
+            free: ["fx", "cx"].map(String::from).to_vec(),
+            held: [].into(),
+        };
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut answer = answer();
+        answer.parameters.extend(["fx", "fy"].map(|name| (name.to_string(), 600.0)));
+        answer.parameters.remove("k1");
+        answer.poses = Some(vec![AnswerPose { rotation, translation: [0.0, 0.0, 1.0] }]);
+        (problem, answer)
+    }
+
+    /// Marks whose x have the sum 0 and the squared sum 12.
+    const SIX: [[f64; 2]; 6] = [[-2.0, 0.0], [2.0, 0.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
+    /// Six marks of an RMSE of 0.1 px, of which two parameters and a pose leave four degrees of freedom.
+    const VARIANCE: f64 = 6.0 * 0.01 / 4.0;
+
+    fn is_near(found: f64, expected: f64) -> bool {
+        (found - expected).abs() <= 1e-9 * expected.abs().max(1e-9)
+    }
+
+    #[test]
+    fn with_known_poses_fx_and_cx_are_a_regression_on_x() {
+        let (problem, mut answer) = facing(&SIX, |_| [0.0; 2]);
+        answer.covariance.as_mut().unwrap().parameters = problem.free.clone();
+        covariance_without_poses(&problem, &mut answer);
+        let stated = answer.covariance.unwrap().matrix;
+        for (i, j, expected) in [(0, 0, VARIANCE / 12.0), (1, 1, VARIANCE / 6.0), (0, 1, 0.0), (1, 0, 0.0)] {
+            assert!(is_near(stated[i][j], expected), "{stated:?}");
+        }
+    }
+
+    #[test]
+    fn the_pose_covariance_of_a_known_camera_is_the_inverse_of_what_the_marks_tell() {
+        let (problem, mut answer) = facing(&SIX, |_| [0.0; 2]);
+        pose_covariances_of_a_known_camera(&problem, &mut answer);
+        let stated = &answer.pose_covariances.unwrap()[0];
+        // What a small turn of the target about its origin and a small way make of a mark's pixel.
+        let along_u = |[x, y]: [f64; 2]| [-x * y, x * x, -y, 1.0, 0.0, -x].map(|d| 600.0 * d);
+        let along_v = |[x, y]: [f64; 2]| [-y * y, x * y, x, 0.0, 1.0, -y].map(|d| 600.0 * d);
+        let gradients = || SIX.into_iter().flat_map(|mark| [along_u(mark), along_v(mark)]);
+        let information = Matrix6::from_fn(|i, j| gradients().map(|g| g[i] * g[j]).sum::<f64>());
+        let product = information * Matrix6::from_fn(|i, j| stated[i][j]);
+        assert!((product - VARIANCE * Matrix6::identity()).amax() < 1e-12, "{product}");
+    }
+
+    #[test]
+    fn a_covariance_is_scaled_as_a_whole() {
+        let mut answer = answer();
+        scale_covariance(&mut answer, 2.0);
+        assert_eq!(answer.covariance.unwrap().matrix, [[8.0, 2.0], [2.0, 18.0]]);
+    }
+
+    #[test]
+    fn turned_pose_covariances_turn_rotations_and_leave_translations() {
+        let (_, mut answer) = facing(&SIX, |_| [0.0; 2]);
+        let stated = Matrix6::from_fn(|i, j| if i == j { (i + 1) as f64 } else { 0.1 });
+        answer.pose_covariances = Some(vec![rows(&stated)]);
+        // A quarter turn about z: the target's x is the camera's y, its y the camera's -x.
+        answer.poses.as_mut().unwrap()[0].rotation = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut in_degrees = answer.clone();
+        turn_pose_covariances(&mut in_degrees, |_| Matrix3::from_diagonal_element(10.0));
+        turn_pose_covariances(&mut answer, |pose| pose.rotation.transpose());
+        let found = answer.pose_covariances.unwrap().remove(0);
+        assert_eq!([found[0][0], found[1][1], found[2][2], found[5][5]], [2.0, 1.0, 3.0, 6.0]);
+        assert_eq!([found[0][1], found[0][3], found[1][3], found[3][4]], [-0.1, 0.1, -0.1, 0.1]);
+        let found = in_degrees.pose_covariances.unwrap().remove(0);
+        assert_eq!([found[1][1], found[1][2], found[1][4], found[4][4]], [200.0, 10.0, 1.0, 5.0]);
+    }
+
+    #[test]
+    fn outliers_do_not_widen_the_covariance_of_the_median() {
+        // The median of a normal variable's size is 0.67449 of its deviation, here 1.
+        let (problem, mut answer) =
+            facing(&SIX, |i| if i == 0 { [9.0, -9.0] } else { [0.674_489_750_196_081_7; 2] });
+        answer.warnings.push("far off".into());
+        covariance_of_the_median(&problem, &mut answer);
+        let mean_square = (2.0 * 81.0 + 10.0 * 0.454_936_423_119_573) / 12.0;
+        let stated = answer.covariance.unwrap().matrix;
+        assert!(is_near(stated[0][0], 4.0 / mean_square) && is_near(stated[0][1], 1.0 / mean_square));
+        assert!(answer.warnings.is_empty());
+    }
+
+    /// The example's marks, each with a normal residual.
+    fn noise(trial: u64) -> Vec<(Vec2, Vec2)> {
+        let key = StreamKey { seed: 1, scenario: "contrast", trial, purpose: "noise" };
+        let mut stream = Stream::open(key);
+        let mut residual = |point| (point, 0.3 * Vec2::new(stream.normal(), stream.normal()));
+        Truth::example_board().points().into_iter().map(&mut residual).collect()
+    }
+
+    const NAMES: [&str; 10] = ["fx", "fy", "cx", "cy", "p1", "p2", "k1", "k2", "k3", "skew"];
+
+    #[test]
+    fn contrasts_are_standard_normal_numbers() {
+        for name in NAMES {
+            let found: Vec<f64> = (0..400).map(|trial| contrast(&noise(trial), name)).collect();
+            let mean = found.iter().sum::<f64>() / 400.0;
+            let square = found.iter().map(|z| z * z).sum::<f64>() / 400.0;
+            // Standard errors of 0.05 and 0.07.
+            assert!(mean.abs() < 0.2 && (square - 1.0).abs() < 0.28, "{name}: {mean} {square}");
+        }
+        let exact: Vec<(Vec2, Vec2)> = noise(0).iter().map(|(x, _)| (*x, Vec2::zeros())).collect();
+        assert!(contrast(&exact, "fx").is_nan());
+    }
+
+    #[test]
+    fn contrasts_are_exchanged_with_the_axes_and_the_same_in_another_unit() {
+        let residuals = noise(0);
+        let exchanged: Vec<(Vec2, Vec2)> = residuals.iter().map(|(x, r)| (x.yx(), r.yx())).collect();
+        let in_inches: Vec<(Vec2, Vec2)> = residuals.iter().map(|(x, r)| (x / 25.4, *r)).collect();
+        let others = ["fy", "fx", "cy", "cx", "p2", "p1", "k1", "k2", "k3", "skew"];
+        for (name, other) in NAMES.into_iter().zip(others) {
+            let z = contrast(&residuals, name);
+            assert!(is_near(contrast(&exchanged, other), z), "{name} {other}");
+            assert!(is_near(contrast(&in_inches, name), z), "{name}");
+        }
+    }
+
+    #[test]
+    fn no_contrast_follows_what_a_camera_or_a_pose_could() {
+        let smooth: [fn(f64, f64) -> f64; 6] =
+            [|_, _| 1.0, |x, _| x, |_, y| y, |x, _| x * x, |x, y| x * y, |_, y| y * y];
+        for name in NAMES {
+            for (i, field) in smooth.iter().enumerate() {
+                for axis in 0..2 {
+                    let mut residuals = noise(0);
+                    for (point, residual) in &mut residuals {
+                        *residual = Vec2::zeros();
+                        residual[axis] = field(point.x, point.y);
+                    }
+                    let z = contrast(&residuals, name);
+                    // The squared cosine between residuals and weights.
+                    let share = z * z / (2.0 * 63.0);
+                    assert!(share < 0.1, "{name}, field {i} along axis {axis}: {share}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_added_by_the_symmetric_root_of_the_correlations() {
+        let (problem, mut answer) = facing(&SIX, |i| [[0.3, -0.1], [-0.2, 0.4]][i % 2]);
+        answer.covariance.as_mut().unwrap().parameters = problem.free.clone();
+        answer.parameters.insert("cx".into(), 0.0);
+        let z = ["fx", "cx"].map(|name| contrast(&residuals(&problem, &answer), name));
+        add_noise(&problem, &mut answer, 0.04);
+        // Of deviations 2 and 3 and a correlation of a sixth: the root of ((1, c), (c, 1)) has the sum of
+        // sqrt(1 + c) and sqrt(1 - c) beside their difference.
+        let (more, less) = ((7.0f64 / 6.0).sqrt(), (5.0f64 / 6.0).sqrt());
+        let (same, other) = (0.5 * (more + less), 0.5 * (more - less));
+        let fx = 600.0 + 0.2 * 2.0 * (same * z[0] + other * z[1]);
+        let cx = 0.2 * 3.0 * (other * z[0] + same * z[1]);
+        assert!((answer.parameters["fx"] - fx).abs() < 1e-9, "{:?}", answer.parameters);
+        assert!((answer.parameters["cx"] - cx).abs() < 1e-9, "{:?}", answer.parameters);
+        assert_eq!((answer.poses, answer.pose_covariances, answer.rmse), (None, None, None));
     }
 }
