@@ -415,4 +415,15 @@ mod tests {
             assert_eq!(Allowance::of_toml(nothing), Ok(Vec::new()), "{nothing:?}");
         }
     }
+
+    #[test]
+    fn only_a_scene_that_is_named_is_told_not_to_need_its_allowance() {
+        let text = "[[allow]]\nproperty = 'exactness'\nscenes = ['metres']\nreason = 'x'\n";
+        let named = Allowance::of_toml(text).unwrap().remove(0);
+        let every = Allowance { scenes: Vec::new(), ..named.clone() };
+        let held = |scene| Check { verdict: Verdict::Held, ..check(Property::Exactness, scene, true, None) };
+        let checks = [held("metres"), held("four-pose")];
+        assert_eq!(named.applied(&checks).not_needed_by, ["metres"]);
+        assert!(every.applied(&checks).not_needed_by.is_empty());
+    }
 }

@@ -292,4 +292,13 @@ mod tests {
         assert_eq!(flagged(&warned(2)), [true, false, true]);
         assert_eq!(flagged(&refused), [true, true, false]);
     }
+
+    #[test]
+    fn what_is_told_has_the_errors_the_flags_and_whether_it_is_visible() {
+        let told = admission(3.0, 16, 4).told();
+        assert!(told.contains("fx are 3.00 times") && told.contains("4 of 16 flagged"), "{told}");
+        assert!(!told.contains("told only"), "{told}");
+        let hidden = Admission { seen_in_residuals: 0.5, worst: None, ..admission(3.0, 16, 4) }.told();
+        assert!(hidden.contains("no standard deviations") && hidden.contains("told only"), "{hidden}");
+    }
 }

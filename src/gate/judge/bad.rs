@@ -277,4 +277,15 @@ mod tests {
         let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
         assert!((p / 1e-4 - 1.0).abs() < 1e-9 && check.grave, "{p}");
     }
+
+    #[test]
+    fn an_error_that_chance_makes_once_in_a_thousand_million_is_right_and_a_rarer_one_misleads() {
+        let (_, any) = any_estimate();
+        // Above x on six degrees lies exp(-y) (1 + y + y^2 / 2), y = x / 2: 4.7e-9 and 2.9e-10.
+        for (nees, is_misled) in [(6.0, false), (50.0, false), (56.0, true)] {
+            let (errors, standard_deviations) = (vec![7.0; 6], Some(vec![1.0; 6]));
+            let trial = Trial { nees, warnings: 0, errors, standard_deviations, ..any.clone() };
+            assert_eq!(misled(&Seen::Estimate(Box::new(trial))), is_misled, "{nees}");
+        }
+    }
 }

@@ -198,3 +198,19 @@ impl Check {
         Check { grave: true, ..self }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_verdict_has_a_word_of_its_own_and_the_worse_ones_are_greater() {
+        use Verdict::{Accepted, Failed, Grave, Held, NotJudged};
+        let all = [NotJudged, Held, Accepted, Failed, Grave];
+        for pair in all.windows(2) {
+            assert!(pair[0] < pair[1]);
+        }
+        let words: std::collections::BTreeSet<&str> = all.map(Verdict::word).into();
+        assert!(words.len() == 5 && !words.contains(""), "{words:?}");
+    }
+}

@@ -93,4 +93,18 @@ mod tests {
         assert!(!Habits::of(&plan, &seen).answers);
         assert!(Habits::of(&plan, &vec![None; seen.len()]).answers);
     }
+
+    #[test]
+    fn warnings_of_good_data_are_counted_against_one_in_twenty() {
+        let (plan, mut seen) = answered(2);
+        let left = Cell::new(1);
+        change(&plan, &mut seen, Purpose::Sample, |seen| {
+            let Seen::Estimate(trial) = seen else { panic!("it is answered") };
+            trial.warnings = 3 * left.replace(0);
+        });
+        let check = super::super::tests::on_scene(&plan, &seen, specificity);
+        // One at least of two: 1 - 0.95^2.
+        let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+        assert!((p - 0.0975).abs() < 1e-12 && check.problems == 2, "{check:?}");
+    }
 }

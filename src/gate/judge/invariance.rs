@@ -83,6 +83,7 @@ mod tests {
         };
         let follows = judged(&seen);
         assert!(matches!(follows.basis, Basis::Chance(_)) && follows.size_px.unwrap() < 1e-6);
+        assert!(!follows.evidence.contains("one way round"), "{}", follows.evidence);
         // One way and the other, as the sample's own errors are of both signs.
         for step in [0.3, -0.3] {
             change_trials(&plan, &mut seen, Purpose::Sample, |trial| {

@@ -103,6 +103,8 @@ mod tests {
             (1.0, "per point: sqrt(sum / N)", true),
             (0.5f64.sqrt(), "per coordinate: sqrt(sum / 2N)", false),
             ((252.0f64 / 474.0).sqrt(), "by degrees of freedom: sqrt(sum / (2N - p))", false),
+            ((252.0f64 / 237.0).sqrt(), "per point by degrees of freedom: sqrt(sum / (N - p / 2))", false),
+            (252.0f64.sqrt(), "root of the sum", false),
         ] {
             let (plan, mut seen) = answered(2);
             change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
@@ -163,5 +165,16 @@ mod tests {
             "{}",
             checks[0].evidence
         );
+    }
+
+    #[test]
+    fn an_rmse_without_residuals_beside_it_has_no_definition() {
+        let (plan, mut seen) = answered(2);
+        change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+            (trial.square, trial.refitted_square) = (None, None);
+        });
+        let checks = on_scene(&plan, &seen, check);
+        assert_eq!((checks[0].basis, checks[0].problems), (Basis::Told, 0));
+        assert_eq!(checks[0].evidence, "no residuals to compare with");
     }
 }

@@ -131,3 +131,19 @@ fn badge(verdict: Verdict) -> String {
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{check, report_of};
+    use crate::judge::{Terms, Verdict};
+
+    #[test]
+    fn the_page_has_every_check_with_its_evidence() {
+        let checks = vec![check("a", Verdict::Held, 0.25), check("b", Verdict::Failed, 1e-9)];
+        let page = report_of(checks, &Terms::default()).to_html();
+        for seen in ["&lt;seen on a&gt;", "&lt;seen on b&gt;"] {
+            assert!(page.contains(&format!("<td>{seen}</tr>")), "{seen} in {page}");
+        }
+        assert!(page.contains("1 of 2 hold") && page.contains("0.25"), "{page}");
+    }
+}

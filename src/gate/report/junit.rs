@@ -76,4 +76,18 @@ mod tests {
     fn what_a_solver_says_cannot_break_the_report() {
         assert_eq!(escaped("a<b> & \"c\"\n\u{1b}[0m"), "a&lt;b&gt; &amp; &quot;c&quot;&#10;[0m");
     }
+
+    #[test]
+    fn a_property_is_a_suite_that_counts_its_cases() {
+        use super::super::tests::{check, report_of};
+        use Verdict::{Failed, Grave, Held, NotJudged};
+        let checks = [("a", Held), ("b", Failed), ("c", Grave), ("d", NotJudged)];
+        let checks = checks.map(|(scene, verdict)| check(scene, verdict, 0.5)).to_vec();
+        let xml = report_of(checks, &crate::Terms::default()).to_junit();
+        let suite = "<testsuite name=\"bias\" tests=\"4\" skipped=\"1\" failures=\"2\" errors=\"0\">";
+        assert!(xml.contains(suite), "{xml}");
+        let cases =
+            ["a", "b", "c", "d"].map(|scene| format!("<testcase name=\"{scene}\" classname=\"bias\">"));
+        assert!(cases.iter().all(|case| xml.contains(case)), "{xml}");
+    }
 }

@@ -202,3 +202,33 @@ fn described(plan: &Plan) -> Vec<Described> {
     });
     scenarios.chain(bad).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Asked;
+
+    /// A report of a run in which nothing was asked, with these checks.
+    pub(super) fn report_of(checks: Vec<Check>, terms: &Terms) -> Report {
+        let plan = Plan::of(1, 0, Asked { scenes: vec!["four-pose".into()], ..Asked::default() }).unwrap();
+        let verdict = checks.iter().map(|check| check.verdict).max().unwrap();
+        let allowances = terms.allowances.iter().map(|allowance| allowance.applied(&checks)).collect();
+        let nothing = vec![None; plan.cases.len()];
+        Report { verdict, checks, allowances, ..Report::new(&plan, "mine", &nothing, terms, 0.0) }
+    }
+
+    /// A check of a scene's bias, with a p-value unless it was not judged.
+    pub(super) fn check(scene: &'static str, verdict: Verdict, p: f64) -> Check {
+        let basis = if verdict == Verdict::NotJudged { Basis::Told } else { Basis::Chance(p) };
+        Check { verdict, ..Check::new(Property::Bias, scene, basis, 3, format!("<seen on {scene}>")) }
+    }
+
+    #[test]
+    fn the_worst_check_tells_of_a_property_or_else_the_least_probable() {
+        use Verdict::{Failed, Held};
+        let told = |checks: Vec<Check>| report_of(checks, &Terms::default()).rows()[0].telling.scenario;
+        assert_eq!(told(vec![check("a", Held, 0.5), check("b", Held, 0.01), check("c", Held, 0.2)]), "b");
+        assert_eq!(told(vec![check("a", Held, 1e-9), check("b", Failed, 0.1)]), "b");
+        assert_eq!(told(vec![check("a", Held, 0.5), check("b", Held, 0.5)]), "a");
+    }
+}

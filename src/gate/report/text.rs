@@ -164,3 +164,50 @@ fn line(row: &Row<'_>, columns: usize) -> String {
     let evidence = cut(told, columns.saturating_sub(BEFORE_EVIDENCE));
     format!("{:<18} {:<10} {count:>6}  {evidence}\n", row.property.name(), row.verdict.word())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{check, report_of};
+    use crate::allowances::Allowance;
+    use crate::judge::{Check, Terms, Verdict};
+    use Verdict::{Failed, Held, NotJudged};
+
+    fn text(checks: Vec<Check>) -> String {
+        report_of(checks, &Terms::default()).to_text(200)
+    }
+
+    #[test]
+    fn checks_that_hold_are_counted_of_those_that_were_judged() {
+        let line = |checks: Vec<Check>| {
+            let text = text(checks);
+            text.lines().find(|line| line.starts_with("bias ")).unwrap().to_string()
+        };
+        let judged = line(vec![check("a", Failed, 1e-9), check("b", Held, 0.5), check("c", NotJudged, 1.0)]);
+        assert!(judged.contains(" 1/2  ") && judged.contains("<seen on a>"), "{judged}");
+        let unjudged = line(vec![check("a", NotJudged, 1.0)]);
+        assert!(unjudged.contains(" -  ") && unjudged.contains("<seen on a>"), "{unjudged}");
+    }
+
+    #[test]
+    fn the_last_line_counts_the_checks_that_fail() {
+        let one = text(vec![check("a", Failed, 1e-9), check("b", Held, 0.5)]);
+        assert!(one.contains("NOT TRUSTED: 1 check fails, 0 gravely"), "{one}");
+        let two = text(vec![check("a", Failed, 1e-9), check("b", Verdict::Grave, 1e-9)]);
+        assert!(two.contains("NOT TRUSTED: 2 checks fail, 1 gravely"), "{two}");
+    }
+
+    #[test]
+    fn a_finding_has_its_chance_and_the_other_scenes() {
+        let failed = vec![check("a", Failed, 1.2e-7), check("b", Failed, 1e-9)];
+        let details = report_of(failed, &Terms::default()).details();
+        assert!(details.contains("<seen on a> (p = 1.2e-7)") && details.contains("likewise b"), "{details}");
+    }
+
+    #[test]
+    fn stated_allowances_are_told_with_their_reasons() {
+        let allowances = Allowance::of_toml("[[allow]]\nproperty = 'bias'\nreason = 'known for long'\n");
+        let terms = Terms { allowances: allowances.unwrap(), ..Terms::default() };
+        let text = report_of(vec![check("a", Held, 0.5)], &terms).to_text(200);
+        assert!(text.contains("known for long"), "{text}");
+    }
+}
