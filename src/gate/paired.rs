@@ -649,4 +649,39 @@ mod tests {
         assert!(otherwise(&stating(Some(2.0), Some(0.99))));
         assert!(otherwise(&stating(None, Some(1.0))) && otherwise(&stating(Some(2.0), None)));
     }
+
+    #[test]
+    fn what_differs_in_nothing_has_no_ratio_of_variances() {
+        assert_eq!(spread(&pairs(|x, _| x)), None);
+        assert_eq!(spread(&pairs(|x, _| -x)), None);
+    }
+
+    #[test]
+    fn times_are_compared_by_their_medians_and_honest_scenes_need_no_estimate() {
+        let scenes = ["four-pose", "outliers"].map(String::from).to_vec();
+        let plan = Plan::of(1, 3, crate::plan::Asked { scenes, ..Default::default() }).unwrap();
+        let mut seen = crate::run(&plan, &crate::Builtin, &|_| ());
+        let mut taking = |seconds: f64| {
+            for seen in seen.iter_mut().flatten() {
+                let Seen::Estimate(trial) = seen else { panic!("it is answered") };
+                trial.seconds = seconds;
+            }
+            seen.clone()
+        };
+        let (old, new) = (taking(2.0), taking(3.0));
+        let found = compare(&plan, ("new", &new, &[]), ("old", &old, &[]), 1e-3);
+        // Three of four-pose; of contaminated data both may refuse each.
+        assert_eq!((found.samples, found.comparisons.len()), (3, 2));
+        assert!(found.comparisons.iter().all(|scene| scene.pairs == 3 && scene.time == 1.5));
+    }
+
+    #[test]
+    fn the_text_tells_what_moved_and_what_was_lost() {
+        let lost = compared(Comparison { lost: 2, ..unmoved() }).to_text();
+        assert!(lost.contains("MOVED") && lost.contains("2 answers lost, 0 gained"), "{lost}");
+        assert!(lost.contains("CHANGED: 5 answers differ"), "{lost}");
+        let same = compared(unmoved()).to_text();
+        assert!(!same.contains("MOVED") && !same.contains("lost"), "{same}");
+        assert!(same.contains("SAME LAW: 5 answers differ"), "{same}");
+    }
 }

@@ -218,4 +218,11 @@ mod tests {
             assert_eq!((problems, failed.len(), failed[0].problems), (first, 1, first));
         }
     }
+
+    #[test]
+    fn who_is_caught_by_one_sample_is_asked_no_more() {
+        let refuses = super::super::faults::planted().into_iter().find(|f| f.id == "refuses-everything");
+        let caught = catch(refuses.unwrap(), 1, 2).unwrap();
+        assert_eq!((caught.samples, caught.problems), (Some(1), 1));
+    }
 }
