@@ -327,4 +327,20 @@ mod tests {
         assert!(matches!(only(MOST_SAMPLES + 1), Err(PlanError::TooManySamples { .. })));
         assert!(only(MOST_SAMPLES).is_ok());
     }
+
+    #[test]
+    fn outliers_lie_in_every_direction() {
+        let view = crate::suite::suite().unwrap()[0].setup.exact().remove(0);
+        let mut stream = Stream::open(StreamKey { seed: 1, scenario: "s", trial: 0, purpose: "outliers" });
+        let mut counts = [0; 4];
+        for _ in 0..10 {
+            let moved = displaced(&view, 1.0, &mut stream);
+            for (to, from) in moved.pixels().iter().zip(view.pixels()) {
+                let by = to - from;
+                counts[2 * usize::from(by.x > 0.0) + usize::from(by.y > 0.0)] += 1;
+            }
+        }
+        // A quarter of 630: 157.5 +- 10.9, five standard deviations.
+        assert!(counts.iter().all(|count| (104..212).contains(count)), "{counts:?}");
+    }
 }

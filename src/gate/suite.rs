@@ -421,4 +421,14 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn every_target_turns_its_face_to_the_camera() {
+        for s in suite().unwrap() {
+            for (view, pose) in s.setup.scene.truth.cam_from_target.iter().enumerate() {
+                // A target's Z points away from who looks at it.
+                assert!(pose.rotation.column(2).dot(&pose.translation) > 0.0, "{}, view {view}", s.id);
+            }
+        }
+    }
 }

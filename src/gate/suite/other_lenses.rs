@@ -94,3 +94,28 @@ fn round_about() -> Vec<[f64; 6]> {
     poses.extend([aside(1.0), aside(-1.0), above(1.0), above(-1.0)]);
     poses
 }
+
+#[cfg(test)]
+mod tests {
+    use calibench::geometry::Vec3;
+
+    #[test]
+    fn a_fisheye_that_sees_behind_itself_has_targets_on_all_sides_and_six_ahead() {
+        let suite = crate::suite::suite().unwrap();
+        let scene = &suite.iter().find(|scene| scene.id == "behind-itself").unwrap().setup.scene;
+        let (ahead, around) = scene.truth.cam_from_target.split_at(6);
+        let seen_from = |pose: &calibench::geometry::Pose| -> Vec<f64> {
+            let point = |p: &calibench::geometry::Vec2| pose.apply(&Vec3::new(p.x, p.y, 0.0));
+            let angle = |p: Vec3| libm::atan2(libm::hypot(p.x, p.y), p.z).to_degrees();
+            scene.truth.points.iter().map(|p| angle(point(p))).collect()
+        };
+        assert!(ahead.iter().flat_map(seen_from).all(|degrees| degrees < 90.0));
+        assert!(around.iter().all(|pose| seen_from(pose).iter().any(|degrees| *degrees > 90.0)));
+        // On the right, on the left, below, above: each to its side first of all.
+        let sides = [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)];
+        for (pose, (axis, sign)) in around.iter().zip(sides) {
+            let [along, across] = [axis, 1 - axis].map(|axis| pose.translation[axis]);
+            assert!(sign * along > 2.0 * across.abs(), "{:?}", pose.translation);
+        }
+    }
+}
