@@ -70,4 +70,19 @@ mod tests {
         assert_eq!(of([4.0, 6.1, 6.1, 9.0], None), Some(CovarianceFault::NotPositiveDefinite));
         assert_eq!(of([4.0, 0.0, 0.0, -9.0], None), Some(CovarianceFault::NotPositiveDefinite));
     }
+
+    #[test]
+    fn a_covariance_is_judged_alike_in_every_unit() {
+        for unit in [1e-6, 1.0, 1e6] {
+            let of = |entries: [f64; 4], sd: [f64; 2]| {
+                fault(
+                    &(DMatrix::from_row_slice(2, 2, &entries) * (unit * unit)),
+                    Some(&sd.map(|sd| sd * unit)),
+                )
+            };
+            assert_eq!(of([4.0, 1.0, 1.0005, 9.0], [2.0, 3.0]), None);
+            assert_eq!(of([4.0, 1.0, 1.1, 9.0], [2.0, 3.0]), Some(CovarianceFault::Asymmetric));
+            assert_eq!(of([4.0, 1.0, 1.0, 9.0], [2.0, 3.1]), Some(CovarianceFault::OtherDeviations));
+        }
+    }
 }

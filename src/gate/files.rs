@@ -265,3 +265,90 @@ impl Solver for Recorded {
         problems.iter().map(|problem| Given { answer: self.ask(problem), seconds: f64::NAN }).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Status;
+
+    /// Refuses all but the problem of this id, to which it has no answer.
+    struct Refusing(String);
+
+    impl Solver for Refusing {
+        fn name(&self) -> String {
+            "refusing".into()
+        }
+
+        fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+            match problem.id == self.0 {
+                true => Err(Breakage::Timeout { seconds: 2.0 }),
+                false => Ok(Answer::without_estimate(&problem.id, Status::Refused, "no")),
+            }
+        }
+    }
+
+    #[test]
+    fn answers_that_are_filed_beside_their_problems_are_read_as_they_were_given() {
+        let folder = std::env::temp_dir().join(format!("calibench-gate-files-{}", std::process::id()));
+        let scenes = ["same-tilt", "three-points"].map(String::from).to_vec();
+        let plan = Plan::of(7, 1, Asked { scenes, ..Asked::default() }).unwrap();
+        export(&plan, &folder).unwrap();
+        let problems: Vec<Problem> = plan.cases.iter().map(|case| plan.problem(case)).collect();
+        let lines = std::fs::read_to_string(folder.join("problems.jsonl")).unwrap();
+        let written = lines.lines().map(|line| serde_json::from_str(line).unwrap());
+        assert_eq!(written.collect::<Vec<Problem>>(), problems);
+
+        let solver = Refusing(problems[1].id.clone());
+        let recorder = Recorder::new(&solver);
+        recorder.give_all(&problems);
+        file_answers(&plan, &folder, &recorder).unwrap();
+        let (again, read) = recorded(&folder).unwrap();
+        assert_eq!((again.cases, read.stray()), (plan.cases.clone(), None));
+        let given = read.give_all(&problems);
+        assert_eq!((given.len(), &given[0].answer), (2, &solver.ask(&problems[0])));
+        assert!(matches!(&given[1].answer, Err(Breakage::Recorded(why)) if why.contains("within 2 s")));
+        assert!(given.iter().all(|given| given.seconds.is_nan()));
+
+        // What took somebody's time is not overwritten, and not joined with other problems.
+        assert!(matches!(export(&plan, &folder), Err(FilesError::Answered { .. })));
+        let manifest = folder.join("manifest.json");
+        let of_others =
+            std::fs::read_to_string(&manifest).unwrap().replace(&sha256_hex(lines.as_bytes()), "0");
+        std::fs::write(&manifest, of_others).unwrap();
+        assert!(matches!(recorded(&folder), Err(FilesError::OtherVersion { .. })));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn files_of_answers_are_read_in_the_order_of_their_names_after_the_single_one() {
+        let folder = std::env::temp_dir().join(format!("calibench-gate-answers-{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("answers")).unwrap();
+        let names = |folder: &Path| -> Vec<String> {
+            let name = |file: &PathBuf| file.file_name().unwrap().to_string_lossy().into_owned();
+            answer_files(folder).unwrap().iter().map(name).collect()
+        };
+        assert_eq!(names(&folder), ["answers.jsonl"]);
+        for name in ["answers/b", "answers/a"] {
+            std::fs::write(folder.join(name), "").unwrap();
+        }
+        assert_eq!(names(&folder), ["a", "b"]);
+        std::fs::write(folder.join("answers.jsonl"), "").unwrap();
+        assert_eq!(names(&folder), ["answers.jsonl", "a", "b"]);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_line_is_filed_under_its_problem_once_and_the_first_that_has_none_is_told() {
+        let asked = ["a", "b"].map(String::from).into();
+        let mut read = Recorded { folder: PathBuf::new(), answers: BTreeMap::new(), stray: None };
+        for (number, id) in ["a", "c", "b", "d", "b"].into_iter().enumerate() {
+            let line = format!(r#"{{"id":"{id}","status":"refused"}}"#);
+            read.take(Line::Whole(&line), &asked, || format!("line {}", number + 1));
+        }
+        assert!(read.answers["a"].as_ref().is_ok_and(|answer| answer.id == "a"));
+        assert_eq!(read.answers["b"], Err(Breakage::Twice));
+        assert_eq!(read.answers.len(), 2);
+        let stray = read.stray().unwrap();
+        assert!(stray.starts_with("line 2: ") && stray.ends_with(" c"), "{stray}");
+    }
+}

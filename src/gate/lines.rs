@@ -56,4 +56,12 @@ mod tests {
         let most = MOST_LINE_BYTES;
         assert_eq!(found, [(1, 3, true), (3, most + 1, false), (4, 4, true), (5, most, true), (6, 3, true)]);
     }
+
+    #[test]
+    fn a_last_line_without_an_end_may_be_as_long_as_any() {
+        let most = "x".repeat(MOST_LINE_BYTES);
+        let mut is_whole = Vec::new();
+        for_each(most.as_bytes(), |_, line| is_whole.push(matches!(line, Line::Whole(_)))).unwrap();
+        assert_eq!(is_whole, [true]);
+    }
 }

@@ -248,4 +248,23 @@ mod tests {
         let answer: Answer = serde_json::from_str(r#"{"id":"a","status":"refused","extra":1}"#).unwrap();
         assert_eq!((answer.status, answer.parameters.len()), (Status::Refused, 0));
     }
+
+    #[test]
+    fn a_problem_is_sent_in_one_line_and_read_as_it_was() {
+        let view = ProblemView { target: vec![[0.1, 1.0]], pixels: vec![[1.0 / 3.0, -2.5]] };
+        for model in ["brown-conrady", "kannala-brandt"] {
+            let problem = Problem {
+                id: "a\nb".into(),
+                image_size: [640, 480],
+                model: model.into(),
+                views: vec![view.clone()],
+                free: vec!["fx".into()],
+                held: [("k1".to_string(), -0.1)].into(),
+            };
+            let line = problem.to_line();
+            assert_eq!(serde_json::from_str::<Problem>(&line).unwrap(), problem);
+            // A program that knows one lens only need not know the word.
+            assert!(!line.contains('\n') && line.contains("model") == (model != "brown-conrady"), "{line}");
+        }
+    }
 }

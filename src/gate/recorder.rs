@@ -76,3 +76,40 @@ pub(super) fn broken(line: &str) -> Option<(String, Breakage)> {
     let read: Broken = serde_json::from_str(line).ok()?;
     Some((read.id, Breakage::Recorded(super::quoted::quoted(&read.broken))))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Status;
+
+    /// Refuses the problem `a` and breaks on all others.
+    struct Fragile;
+
+    impl Solver for Fragile {
+        fn name(&self) -> String {
+            "fragile".into()
+        }
+
+        fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+            match problem.id.as_str() {
+                "a" => Ok(Answer::without_estimate("a", Status::Refused, "no")),
+                _ => Err(Breakage::Timeout { seconds: 2.0 }),
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_answered_is_kept_and_so_is_how_it_was_not() {
+        let case = crate::bad_input::bad_cases(1).unwrap().remove(0);
+        let problems = ["a", "b"].map(|id| Problem { id: id.into(), ..case.problem.clone() });
+        let recorder = Recorder::new(&Fragile);
+        assert_eq!(recorder.line("a"), None);
+        recorder.give_all(&problems);
+        let [answered, told] = ["a", "b"].map(|id| recorder.line(id).unwrap());
+        assert_eq!(serde_json::from_str::<Answer>(&answered).ok(), Fragile.ask(&problems[0]).ok());
+        assert_eq!(broken(&answered), None);
+        let (id, breakage) = broken(&told).unwrap();
+        assert!(id == "b" && breakage.to_string().contains("no answer within 2 s"), "{told}");
+        assert_eq!(recorder.line("c"), None);
+    }
+}

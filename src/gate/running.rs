@@ -72,3 +72,21 @@ pub(super) fn halt_where_it_is_over() {
 pub(super) fn start_no_more() {
     running().is_over = true;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::Stdio;
+
+    #[test]
+    fn a_program_runs_under_its_mark_until_it_is_let_go() {
+        let mut starter = Command::new(std::env::current_exe().unwrap());
+        starter.arg("--version").stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = start(&mut starter, "mark").unwrap();
+        let id = child.id();
+        assert!(is_running(id, "mark") && !is_running(id, "another"));
+        child.wait().unwrap();
+        let_go(id);
+        assert!(!is_running(id, "mark"));
+    }
+}

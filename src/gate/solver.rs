@@ -221,3 +221,30 @@ fn answer_pose(pose: &Pose) -> AnswerPose {
         translation: pose.translation.into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Asked, Plan};
+
+    #[test]
+    fn how_a_search_ended_is_told_where_it_was_not_in_a_minimum() {
+        let plan = Plan::of(1, 0, Asked { scenes: vec!["four-pose".into()], ..Asked::default() }).unwrap();
+        let problem = plan.problem(&plan.cases[0]);
+        assert_eq!(Builtin.ask(&problem).unwrap().message, None);
+        let one_step = |mut settings: Settings| {
+            settings.max_iterations = 1;
+            settings.without_search()
+        };
+        let stopped = solve(&problem, one_step).unwrap();
+        assert_ne!(stopped.termination, Termination::Converged);
+        let said = answer("a", &stopped).message;
+        assert_eq!(said.as_deref(), Some(stopped.termination.name()));
+    }
+
+    #[test]
+    fn the_librarys_solvers_have_names_of_their_own() {
+        let names = [Builtin.name(), Polished.name()];
+        assert!(names[0] != names[1] && names.iter().all(|name| name.starts_with("calibench")), "{names:?}");
+    }
+}

@@ -185,3 +185,19 @@ pub fn read_with(
     problems.sort_by(|a, b| (a.reference.level, &a.problem.id).cmp(&(b.reference.level, &b.problem.id)));
     Ok(problems)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_not_the_one_in_the_list_of_sums_is_refused() {
+        // SHA-256 of "abc", the standard's first example.
+        let sums = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  notes.txt\n";
+        let found = |notes: &str| {
+            read_with(|name| Ok(if name == "SHA256SUMS" { sums.into() } else { notes.to_string() }))
+        };
+        assert!(found("abc").unwrap().is_empty());
+        assert!(matches!(found("abd"), Err(ReferenceError::Changed { name, .. }) if name == "notes.txt"));
+    }
+}

@@ -256,4 +256,14 @@ mod tests {
     fn digits_are_rounded_to_tenths() {
         assert_eq!([11.24, 11.26, 0.04, 15.0].map(tenths), [11.2, 11.3, 0.0, 15.0]);
     }
+
+    #[test]
+    fn a_table_has_a_row_for_every_problem_and_a_dash_for_what_was_not_asked() {
+        let of =
+            |solver: &str, problem: &str, least| Row { problem: problem.into(), ..row(solver, Some(least)) };
+        let table = DigitsTable { rows: vec![of("one", "p", 9.0), of("one", "q", 8.0), of("two", "p", 7.0)] };
+        let markdown = table.to_markdown();
+        let rows: Vec<&str> = markdown.lines().skip(2).collect();
+        assert_eq!(rows, ["| `p` | average | 9.0 | 7.0 |", "| `q` | average | 8.0 | - |"]);
+    }
 }
