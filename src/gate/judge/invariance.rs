@@ -83,7 +83,6 @@ mod tests {
         };
         let follows = judged(&seen);
         assert!(matches!(follows.basis, Basis::Chance(_)) && follows.size_px.unwrap() < 1e-6);
-        assert!(!follows.evidence.contains("one way round"), "{}", follows.evidence);
         // One way and the other, as the sample's own errors are of both signs.
         for step in [0.3, -0.3] {
             change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
@@ -117,5 +116,12 @@ mod tests {
         assert!((p - (1.0 - 0.998 * 0.998)).abs() < 1e-12, "{p}");
         assert!(check.evidence.ends_with("; 1 of 2 answered only one way round"), "{}", check.evidence);
         assert_eq!(check.problems, 4);
+    }
+
+    #[test]
+    fn a_variant_of_which_nothing_was_asked_has_no_check() {
+        let (plan, seen) = answered(0);
+        let checks = on_scene(&plan, &seen, check);
+        assert!(checks.is_empty(), "{checks:?}");
     }
 }
