@@ -148,4 +148,76 @@ mod tests {
         let held = asked_of("held");
         assert_eq!(with_fault("image-centre-offset", &held), correct(&held));
     }
+
+    /// The problem with every pixel changed.
+    fn with_pixels(problem: &Problem, how: impl Fn(f64) -> f64) -> Problem {
+        let mut changed = problem.clone();
+        changed.views.iter_mut().flat_map(|view| view.pixels.iter_mut().flatten()).for_each(|x| *x = how(*x));
+        changed
+    }
+
+    #[test]
+    fn pixels_are_rounded_to_halves_and_to_single_precision() {
+        let halves = with_pixels(&asked_of("four-pose"), |x| x.floor() + 0.5);
+        for (fault, off) in [("rounded-to-half-pixels", 0.2), ("rounded-to-f32", 1e-9)] {
+            let problem = with_pixels(&halves, |x| x + off);
+            assert_ne!(correct(&problem), correct(&halves));
+            assert_eq!(with_fault(fault, &problem), correct(&halves), "{fault}");
+        }
+    }
+
+    /// The problem with so many marks of every view.
+    fn with_marks(problem: &Problem, marks: [usize; 4]) -> Problem {
+        let mut changed = problem.clone();
+        for (view, count) in changed.views.iter_mut().zip(marks) {
+            view.target.truncate(count);
+            view.pixels.truncate(count);
+        }
+        changed
+    }
+
+    #[test]
+    fn marks_at_the_end_are_not_used() {
+        let problem = asked_of("four-pose");
+        assert_eq!(with_fault("last-points-dropped", &problem), correct(&with_marks(&problem, [62; 4])));
+        let ragged = with_marks(&problem, [63, 40, 63, 50]);
+        let shortest = correct(&with_marks(&problem, [40; 4]));
+        assert_eq!(with_fault("views-cut-to-the-shortest", &ragged), shortest);
+        let unpaired = asked_of("a-pixel-too-few");
+        assert_eq!(with_fault("views-cut-to-the-shortest", &unpaired), correct(&unpaired));
+    }
+
+    #[test]
+    fn a_view_that_is_dropped_gets_a_pose_of_the_camera_that_the_others_give() {
+        let problem = asked_of("four-pose");
+        let others = correct(&Problem { views: problem.views[..3].to_vec(), ..problem.clone() });
+        let (right, found) = (correct(&problem), with_fault("one-view-dropped", &problem));
+        assert_eq!((&found.parameters, &found.covariance), (&others.parameters, &others.covariance));
+        let [found, right] = [found, right].map(|answer| answer.poses.unwrap());
+        assert_eq!((found.len(), &found[..3]), (4, &others.poses.unwrap()[..]));
+        let apart = found[3].pose().translation - right[3].pose().translation;
+        assert!(apart.norm() < 0.2 && apart.norm() > 0.0, "{apart}");
+    }
+
+    #[test]
+    fn a_view_that_counts_twice_has_one_pose_and_pulls_the_camera() {
+        let problem = asked_of("four-pose");
+        let (right, found) = (correct(&problem), with_fault("first-view-twice", &problem));
+        assert_ne!(found.parameters, right.parameters);
+        let stated = (found.poses.unwrap().len(), found.pose_covariances.unwrap().len());
+        assert_eq!(stated, (4, 4));
+    }
+
+    #[test]
+    fn broken_input_is_mended_where_it_does_not_pair_and_used_where_it_does() {
+        for scene in ["a-pixel-too-few", "a-coordinate-not-measured", "an-empty-view"] {
+            let problem = asked_of(scene);
+            assert_ne!(correct(&problem).status, Status::Ok, "{scene}");
+            let mended = with_fault("broken-input-mended", &problem);
+            assert_eq!((mended.status, mended.poses.unwrap().len()), (Status::Ok, 4), "{scene}");
+        }
+        let good = asked_of("four-pose");
+        let unstated = Answer { pose_covariances: None, ..correct(&good) };
+        assert_eq!(with_fault("broken-input-mended", &good), unstated);
+    }
 }

@@ -123,4 +123,36 @@ mod tests {
         assert_eq!(answer.parameters["k2"], 0.0);
         assert!(answer.parameters["k1"] < -0.1);
     }
+
+    #[test]
+    fn prisms_are_exchanged_in_pairs() {
+        let problem = asked_of("thin-prism");
+        let of = |answer: &Answer| ["s1", "s2", "s3", "s4"].map(|name| answer.parameters[name]);
+        let [s1, s2, s3, s4] = of(&correct(&problem));
+        assert_eq!(of(&prisms_exchanged(&problem)), [s3, s4, s1, s2]);
+    }
+
+    #[test]
+    fn another_lens_has_one_coefficient_of_its_own_and_the_uncertainty_of_the_right_one() {
+        let problem = asked_of("fisheye");
+        let (right, found) = (correct(&problem), another_lens(&problem));
+        assert_ne!(found.parameters["k1"], right.parameters["k1"]);
+        assert_eq!(["k2", "k3", "k4"].map(|name| found.parameters[name]), [0.0; 3]);
+        assert_eq!((found.covariance, found.warnings), (right.covariance, right.warnings));
+    }
+
+    #[test]
+    fn what_determines_no_lens_of_its_kind_is_refused_though_another_would_do() {
+        let mut problem = asked_of("fisheye");
+        // Three views of four marks are 24 coordinates: for 18 and 8 unknowns too few, for 18 and 5 enough.
+        problem.views.truncate(3);
+        for view in &mut problem.views {
+            let corners = [0, 8, 54, 62];
+            view.target = corners.map(|i| view.target[i]).to_vec();
+            view.pixels = corners.map(|i| view.pixels[i]).to_vec();
+        }
+        let right = correct(&problem);
+        assert!(right.parameters.is_empty(), "{right:?}");
+        assert_eq!(another_lens(&problem), right);
+    }
 }

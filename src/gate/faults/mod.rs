@@ -188,7 +188,7 @@ mod tests {
 
     /// The first sample of a scene, or its problem where it is bad input.
     pub(super) fn asked_of(scene: &str) -> Problem {
-        let plan = Plan::of(1, 1, Asked { scenes: vec![scene.into()], ..Asked::default() }).unwrap();
+        let plan = Plan::of(1, 1, Asked { models: Model::ALL.to_vec(), scenes: vec![scene.into()] }).unwrap();
         plan.problem(plan.cases.iter().find(|case| case.purpose != Purpose::Exact).unwrap())
     }
 

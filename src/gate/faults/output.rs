@@ -187,4 +187,13 @@ mod tests {
         let moved = with_fault("biased-fx", &problem).parameters["fx"] - right.parameters["fx"];
         assert!((moved / deviation(&right, "fx") - 0.1).abs() < 1e-9, "{moved}");
     }
+
+    #[test]
+    fn p1_and_p2_are_exchanged_or_turned_round() {
+        let problem = asked_of("tangential");
+        let of = |answer: Answer| ["p1", "p2"].map(|name| answer.parameters[name]);
+        let [p1, p2] = of(correct(&problem));
+        assert_eq!(of(with_fault("p1-p2-swapped", &problem)), [p2, p1]);
+        assert_eq!(of(with_fault("tangential-sign", &problem)), [-p1, -p2]);
+    }
 }

@@ -53,15 +53,17 @@ pub(super) const FAULTS: &[Planted] = &[
 #[cfg(test)]
 mod tests {
     use super::super::tests::{asked_of, with_fault};
+    use super::*;
+    use crate::plan::{Asked, Plan};
 
     #[test]
     fn who_warns_of_everything_answers_rightly_where_it_can_and_confidently_where_it_cannot() {
         let (good, bad) = (asked_of("four-pose"), asked_of("one-facing-view"));
         let warned = |problem| with_fault("warns-of-everything", problem);
-        assert_eq!(warned(&good).parameters, super::correct(&good).parameters);
+        assert_eq!(warned(&good).parameters, correct(&good).parameters);
         assert!(warned(&bad).standard_deviations.unwrap().values().all(|sd| *sd == 1e-3));
         for answer in [warned(&good), warned(&bad)] {
-            assert_eq!(answer.status, super::Status::Ok);
+            assert_eq!(answer.status, Status::Ok);
             assert!(answer.warnings.iter().any(|warning| warning == "use with care"));
         }
     }
@@ -69,8 +71,30 @@ mod tests {
     #[test]
     fn the_last_pose_is_missing_and_no_other() {
         let problem = asked_of("four-pose");
-        let (all, stated) =
-            (super::correct(&problem).poses, with_fault("a-pose-missing", &problem).poses.unwrap());
+        let (all, stated) = (correct(&problem).poses, with_fault("a-pose-missing", &problem).poses.unwrap());
         assert_eq!(stated, all.unwrap()[..3]);
+    }
+
+    #[test]
+    fn what_strikes_now_and_then_changes_what_it_says_and_nothing_elsewhere() {
+        let asked = Asked { scenes: vec!["four-pose".into()], ..Asked::default() };
+        let plan = Plan::of(1, 1000, asked).unwrap();
+        let problem = |wanted: fn(&Problem) -> bool| {
+            plan.cases.iter().map(|case| plan.problem(case)).find(wanted).unwrap()
+        };
+        // One in a hundred is one in fifty and one in twenty as well.
+        let struck = problem(|p| chosen(p, 100));
+        let right = correct(&struck);
+        assert!(with_fault("nan-now-and-then", &struck).parameters["cy"].is_nan());
+        assert_ne!(with_fault("answer-to-another", &struck).id, struck.id);
+        assert_eq!(with_fault("refuses-good-data", &struck).status, Status::Refused);
+        let variance = |answer: Answer| answer.covariance.unwrap().matrix[1][1];
+        let stated = variance(with_fault("certain-now-and-then", &struck)) / variance(right);
+        assert!((stated - 1e-6).abs() < 1e-15, "{stated}");
+
+        let spared = problem(|p| !chosen(p, 10));
+        for fault in ["nan-now-and-then", "answer-to-another", "refuses-good-data", "certain-now-and-then"] {
+            assert_eq!(with_fault(fault, &spared), correct(&spared), "{fault}");
+        }
     }
 }

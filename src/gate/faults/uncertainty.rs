@@ -239,6 +239,7 @@ fn contrast(residuals: &[(Vec2, Vec2)], name: &str) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{asked_of, with_fault};
     use super::*;
     use crate::plan::{Case, Plan, Purpose};
     use crate::protocol::{AnswerCovariance, Status};
@@ -446,5 +447,38 @@ mod tests {
         assert!((answer.parameters["fx"] - fx).abs() < 1e-9, "{:?}", answer.parameters);
         assert!((answer.parameters["cx"] - cx).abs() < 1e-9, "{:?}", answer.parameters);
         assert_eq!((answer.poses, answer.pose_covariances, answer.rmse), (None, None, None));
+    }
+
+    #[test]
+    fn a_stated_covariance_is_changed_entry_by_entry_as_named() {
+        let problem = asked_of("four-pose");
+        let right = correct(&problem).covariance.unwrap().matrix;
+        let stated = |fault: &str| with_fault(fault, &problem).covariance.unwrap().matrix;
+        let check = |fault: &str, expected: &dyn Fn(usize, usize) -> f64| {
+            for (i, row) in stated(fault).iter().enumerate() {
+                for (j, found) in row.iter().enumerate() {
+                    assert!((found - expected(i, j)).abs() <= 1e-12 * right[i][j].abs(), "{fault} {i} {j}");
+                }
+            }
+        };
+        let on_diagonal = |i: usize, j: usize| f64::from(u8::from(i == j));
+        check("covariance-doubled", &|i, j| 2.0 * right[i][j]);
+        // Four views of 63 marks, six parameters.
+        check("covariance-per-2n", &|i, j| 474.0 / 504.0 * right[i][j]);
+        check("correlations-dropped", &|i, j| on_diagonal(i, j) * right[i][j]);
+        check("covariance-not-definite", &|i, j| (1.02 - 0.02 * on_diagonal(i, j)) * right[i][j]);
+    }
+
+    #[test]
+    fn a_covariance_in_another_order_stands_beside_deviations_in_the_right_one() {
+        let mut answer = answer();
+        covariance_in_another_order(&mut answer);
+        let stated = answer.covariance.unwrap();
+        assert_eq!(
+            (stated.parameters, stated.matrix),
+            (vec!["fx".into(), "k1".into()], vec![vec![9.0, 1.0], vec![1.0, 4.0]])
+        );
+        let deviations = answer.standard_deviations.unwrap();
+        assert_eq!((deviations["fx"], deviations["k1"]), (2.0, 3.0));
     }
 }
