@@ -658,7 +658,7 @@ mod tests {
 
     #[test]
     fn times_are_compared_by_their_medians_and_honest_scenes_need_no_estimate() {
-        let scenes = ["four-pose", "outliers"].map(String::from).to_vec();
+        let scenes = ["four-pose", "metres", "outliers"].map(String::from).to_vec();
         let plan = Plan::of(1, 3, crate::plan::Asked { scenes, ..Default::default() }).unwrap();
         let mut seen = crate::run(&plan, &crate::Builtin, &|_| ());
         let mut taking = |seconds: f64| {
@@ -670,8 +670,8 @@ mod tests {
         };
         let (old, new) = (taking(2.0), taking(3.0));
         let found = compare(&plan, ("new", &new, &[]), ("old", &old, &[]), 1e-3);
-        // Three of four-pose; of contaminated data both may refuse each.
-        assert_eq!((found.samples, found.comparisons.len()), (3, 2));
+        // Three each of two; of contaminated data both may refuse each.
+        assert_eq!((found.samples, found.comparisons.len()), (6, 3));
         assert!(found.comparisons.iter().all(|scene| scene.pairs == 3 && scene.time == 1.5));
     }
 

@@ -96,15 +96,15 @@ mod tests {
 
     #[test]
     fn warnings_of_good_data_are_counted_against_one_in_twenty() {
-        let (plan, mut seen) = answered(2);
+        let (plan, mut seen) = answered(3);
         let left = Cell::new(1);
         change(&plan, &mut seen, Purpose::Sample, |seen| {
             let Seen::Estimate(trial) = seen else { panic!("it is answered") };
             trial.warnings = 3 * left.replace(0);
         });
         let check = super::super::tests::on_scene(&plan, &seen, specificity);
-        // One at least of two: 1 - 0.95^2.
+        // One at least of three: 1 - 0.95^3.
         let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
-        assert!((p - 0.0975).abs() < 1e-12 && check.problems == 2, "{check:?}");
+        assert!((p - 0.142_625).abs() < 1e-12 && check.problems == 3, "{check:?}");
     }
 }
