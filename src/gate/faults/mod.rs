@@ -257,4 +257,17 @@ mod tests {
         );
         assert_ne!(with_fault("no-refinement", &problem).covariance, right.covariance);
     }
+
+    #[test]
+    fn a_search_that_did_not_end_is_stated_as_good() {
+        let problem = asked_of("four-pose");
+        let right = correct(&problem);
+        let [none, one] = ["no-refinement", "one-iteration"].map(|fault| with_fault(fault, &problem));
+        for answer in [&none, &one] {
+            assert_ne!(answer.parameters, right.parameters);
+            let said = (answer.status, &answer.message, &answer.warnings);
+            assert_eq!(said, (Status::Ok, &None, &right.warnings));
+        }
+        assert_ne!(none.parameters, one.parameters);
+    }
 }

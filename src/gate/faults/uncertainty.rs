@@ -241,7 +241,7 @@ fn contrast(residuals: &[(Vec2, Vec2)], name: &str) -> f64 {
 mod tests {
     use super::super::tests::{asked_of, with_fault};
     use super::*;
-    use crate::plan::{Case, Plan, Purpose};
+    use crate::plan::{Asked, Case, Plan, Purpose};
     use crate::protocol::{AnswerCovariance, Status};
     use calibench::synth::{Stream, StreamKey, Truth};
 
@@ -480,5 +480,44 @@ mod tests {
         );
         let deviations = answer.standard_deviations.unwrap();
         assert_eq!((deviations["fx"], deviations["k1"]), (2.0, 3.0));
+    }
+
+    #[test]
+    fn rotations_are_told_in_degrees_and_translations_as_they_were() {
+        let problem = asked_of("four-pose");
+        let last = |answer: Answer| answer.pose_covariances.unwrap().remove(3);
+        let (right, found) =
+            (last(correct(&problem)), last(with_fault("pose-covariance-in-degrees", &problem)));
+        let degrees = 180.0 / std::f64::consts::PI;
+        for (i, j, factor) in [(0, 0, degrees * degrees), (2, 4, degrees), (4, 4, 1.0)] {
+            assert!((found[i][j] / right[i][j] / factor - 1.0).abs() < 1e-12, "{i} {j}");
+        }
+    }
+
+    /// The squared distance of an answer's parameters from the right ones, in the stated covariance.
+    fn moved(fault: &str, problem: &Problem) -> f64 {
+        let (right, found) = (correct(problem), with_fault(fault, problem));
+        assert_eq!((found.poses, found.rmse), (None, None));
+        let step = |name: &String| found.parameters[name] - right.parameters[name];
+        let step = DVector::from_iterator(6, problem.free.iter().map(step));
+        let stated = found.covariance.unwrap();
+        assert_eq!(stated.parameters, problem.free);
+        let covariance = DMatrix::from_fn(6, 6, |i, j| stated.matrix[i][j]);
+        step.dot(&covariance.cholesky().unwrap().solve(&step))
+    }
+
+    #[test]
+    fn a_bias_that_is_followed_is_a_tenth_of_a_deviation_in_all() {
+        assert!((moved("biased-fx-followed", &asked_of("four-pose")) - 0.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_excess_is_a_twentieth_of_every_parameters_variance() {
+        let asked = Asked { scenes: vec!["four-pose".into()], ..Asked::default() };
+        let plan = Plan::of(1, 32, asked).unwrap();
+        let samples = plan.cases.iter().filter(|case| case.purpose == Purpose::Sample);
+        let sum: f64 = samples.map(|case| moved("excess-variance", &plan.problem(case))).sum();
+        // Chi-squared on six over 32 samples, times 0.05: 9.6 +- 0.98, five standard deviations.
+        assert!((4.7..14.5).contains(&sum), "{sum}");
     }
 }
