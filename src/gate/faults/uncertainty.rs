@@ -282,8 +282,8 @@ mod tests {
         }
     }
 
-    /// One view of `target` from a distance of 1 by a pinhole of 600 px, each mark displaced as `by` says, and
-    /// an answer that states the camera and the pose without error.
+    /// One view of `target` from a distance of 1 by a pinhole of 600 px, each mark displaced as `by` says;
+    /// and an answer that states the camera and the pose without error.
     fn facing(target: &[[f64; 2]], mut by: impl FnMut(usize) -> [f64; 2]) -> (Problem, Answer) {
         let pixel = |(i, [x, y]): (usize, &[f64; 2])| [600.0 * x + by(i)[0], 600.0 * y + by(i)[1]];
         let pixels = target.iter().enumerate().map(pixel).collect();
