@@ -204,12 +204,16 @@ fn a_study_with_numbers_or_texts_that_cannot_be_kept_is_refused() {
 #[test]
 fn answers_are_kept_where_the_report_cannot_be_written() {
     let folder = folder("kept-answers");
-    fs::write(folder.join("file"), "no folder").expect("written");
-    let gate = ["gate", "--samples", "1", "--record", "g", "--json", "file/report.json"];
-    assert_eq!(limited(&folder, &gate).status.code(), Some(3));
-    assert!(folder.join("g/answers.jsonl").is_file());
+    // While it is asked, a folder appears where the report was to be.
+    let solver = "mkdir -p report.json; cat";
+    let gate = ["gate", "--solver", solver, "--scene", "four-pose", "--samples", "1", "--record", "g"];
+    let reports = ["--json", "report.json", "--html", "report.html"];
+    let output = limited(&folder, &[&gate[..], &reports].concat());
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("report.json") && !output.stdout.is_empty());
+    assert!(folder.join("g/answers.jsonl").is_file() && folder.join("report.html").is_file());
     let judged = limited(&folder, &["gate", "judge", "g"]);
-    assert_eq!(judged.status.code(), Some(0), "{}", text(&judged.stdout));
+    assert_eq!(judged.status.code(), Some(1), "{}", text(&judged.stdout));
     // Nor is a report asked for where there is none.
     refused(&folder, &["gate", "faults", "--json", "r.json"], &["unexpected argument '--json'"]);
     refused(&folder, &["gate", "power", "p", "--json", "r.json"], &["unexpected argument '--json'"]);

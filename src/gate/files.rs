@@ -347,6 +347,13 @@ mod tests {
         }
         assert!(read.answers["a"].as_ref().is_ok_and(|answer| answer.id == "a"));
         assert_eq!(read.answers["b"], Err(Breakage::Twice));
+        // Nor does a line that says why there is no answer replace one, or stand for a problem that there is not.
+        for (number, id) in ["a", "e"].into_iter().enumerate() {
+            let line = format!(r#"{{"id":"{id}","broken":"it took too long"}}"#);
+            read.take(Line::Whole(&line), &asked, || format!("line {}", number + 6));
+        }
+        assert_eq!(read.answers["a"], Err(Breakage::Twice));
+        assert!(!read.answers.contains_key("e"));
         assert_eq!(read.answers.len(), 2);
         let stray = read.stray().unwrap();
         assert!(stray.starts_with("line 2: ") && stray.ends_with(" c"), "{stray}");
