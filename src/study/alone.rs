@@ -74,3 +74,36 @@ impl Spec {
         toml::to_string(self).expect("a study came from TOML and goes back into it")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Inputs, Trial, in_memory_seeing};
+
+    #[test]
+    fn a_cell_alone_reads_the_tables_of_its_run_and_has_the_same_trials() {
+        // The second has the names of its cells, here of two factors, in the keys of its noise.
+        let tilt = "\n[[factor]]\nname = \"tilt\"\nset = [\"scene.poses.tilt_deg\"]\nlevels = [30.0, 35.0]\n";
+        let named = format!("common_random_numbers = false\n{STUDY}{tilt}");
+        for (text, cells) in [(STUDY, 2), (&named, 4)] {
+            let run = |spec: Spec, text: &str| {
+                let mut trials: Vec<Trial> = Vec::new();
+                let engine = in_memory_seeing(spec, text, |trial| trials.push(trial.clone()), |_| ());
+                (engine.unwrap(), trials)
+            };
+            let (engine, mut trials) = run(Spec::parse(text).unwrap(), text);
+            let tables = serde_json::json!({
+                "runs/one/marks.csv": marks(&engine),
+                "runs/one/poses.csv": poses(&engine).unwrap(),
+            });
+            let alone = engine.alone(1, "runs/one/").unwrap().to_text();
+            let inputs = Inputs::parse(&tables.to_string()).unwrap();
+            let (_, again) = run(Spec::parse_with(&alone, &inputs).unwrap(), &alone);
+            trials.retain(|trial| trial.cell == 1);
+            trials.iter_mut().for_each(|trial| trial.cell = 0);
+            assert!(again == trials, "{alone}");
+            assert!(engine.alone(cells, "runs/one/").is_none());
+        }
+    }
+}
