@@ -250,7 +250,8 @@ impl Grid<'_> {
 mod tests {
     use super::*;
     use crate::example::STUDY;
-    use crate::{Spec, in_memory, summarise};
+    use crate::{Expected, Shard, Spec, Trial, in_memory, summarise};
+    use std::collections::BTreeMap;
 
     #[test]
     fn few_series_are_drawn_over_the_factor_and_many_cell_by_cell() {
@@ -279,5 +280,106 @@ mod tests {
             names.iter().any(|name| name == "ratio") && names.iter().all(|name| name != "spread"),
             "{names:?}"
         );
+    }
+
+    /// The study after four trials a cell, whose values are these multiples of the bound for an error and of
+    /// the expected mean for what is none; every other cell has the second four.
+    fn after(text: &str, multiples: [[f64; 4]; 2]) -> Engine {
+        let mut engine = Engine::new(text, Shard::WHOLE).unwrap();
+        for (cell, tally) in engine.cells.iter().zip(&mut engine.tallies) {
+            for (trial, multiple) in multiples[cell.index % 2].into_iter().enumerate() {
+                let of =
+                    |p: &Option<Expected>| p.map(|p| multiple * if p.mean == 0.0 { p.sd } else { p.mean });
+                let values = cell.prediction.0.iter().map(of).collect();
+                let (cell, trial) = (cell.index, trial as u64);
+                tally.add(&Trial { cell, trial, outcome: "converged".into(), iterations: 1, values });
+            }
+        }
+        engine
+    }
+
+    fn svg(figure: &Figure) -> String {
+        String::from_utf8(figure.bytes.clone()).unwrap()
+    }
+
+    #[test]
+    fn every_cell_of_a_heat_map_has_its_number_written_in() {
+        // Means 2 and -0.75; standard deviations 3 sqrt(4 / 3) and 0.3 of that.
+        let engine = after(STUDY, [[-1.0, 5.0, -1.0, 5.0], [-1.65, 0.15, -1.65, 0.15]]);
+        let figures = Grid { engine: &engine, summary: &summarise(&engine) }.by_cell();
+        let names: Vec<&str> = figures.iter().map(|figure| &figure.name[..]).collect();
+        assert_eq!(names, ["ratio", "bias", "means"]);
+        // Seven errors, RMSE and NEES.
+        for (figure, [first, second], rows) in [
+            (&figures[0], ["3.46", "1.04"], 7),
+            (&figures[1], ["2.00", "0.750"], 7),
+            (&figures[2], ["2.00", "\u{2212}0.750"], 2),
+        ] {
+            let count = |number| svg(figure).lines().filter(|line| *line == number).count();
+            assert!(count(first) >= rows && count(second) >= rows, "{}", svg(figure));
+        }
+    }
+
+    #[test]
+    fn a_cell_in_which_nothing_converged_stands_at_zero() {
+        let mut engine = after(STUDY, [[1.0, 2.0, 3.0, 4.0]; 2]);
+        let shares = |engine: &Engine| Grid { engine, summary: &summarise(engine) }.endings(0);
+        assert_eq!(shares(&engine), None);
+        engine.tallies[1] = engine.for_shard(Shard::WHOLE).tallies.remove(1);
+        let (outcome, values) = ("stalled".to_string(), vec![None; engine.quantities.len()]);
+        engine.tallies[1].add(&Trial { cell: 1, trial: 0, outcome, iterations: 1, values });
+        let svg = svg(&shares(&engine).unwrap());
+        // The axis holds no share and all of them.
+        let ends = ["0.0", "1.0"].map(|end| svg.lines().filter(|line| *line == end).count());
+        assert_eq!(ends, [1, 1], "{svg}");
+    }
+
+    #[test]
+    fn errors_are_drawn_beside_the_quantiles_of_a_normal_distribution() {
+        let (alone, _) = STUDY.split_once("[[factor]]").unwrap();
+        let engine = after(alone, [[-1.0, 1.0, -2.0, 2.0]; 2]);
+        let svg = svg(&Grid { engine: &engine, summary: &summarise(&engine) }.distributions());
+        let curves = svg.split("points=\"").map(|rest| {
+            let numbers = rest.split('"').next().unwrap().split([',', ' ']);
+            numbers.filter_map(|number| number.parse().ok()).collect::<Vec<f64>>()
+        });
+        let curves: Vec<Vec<f64>> = curves.filter(|numbers| numbers.len() == 2 * 99).collect();
+        assert_eq!(curves.len(), 7, "one an error");
+        for curve in curves {
+            let at = |percent: usize| [curve[2 * percent - 2], curve[2 * percent - 1]];
+            // As many trials lie below the median as above.
+            let [[left, _], [middle, median], [right, _]] = [1, 50, 99].map(at);
+            assert!(right - left > 1000.0 && (left + right - 2.0 * middle).abs() <= 2.0);
+            // One in a hundred lies 2.3263 standard deviations below it or above, 16 lie 0.9945 below.
+            let [low, lower, high] = [16, 1, 99].map(|percent| at(percent)[1] - median);
+            assert!((lower / low - 2.3263 / 0.9945).abs() < 0.02 && (lower + high).abs() <= 2.0);
+        }
+    }
+
+    #[test]
+    fn the_numbers_of_neighbouring_cells_do_not_run_into_each_other() {
+        let tilts: Vec<f64> = (0..12).map(|i| 20.0 + f64::from(i)).collect();
+        let factor = "\n[[factor]]\nname = \"tilt\"\nset = [\"scene.poses.tilt_deg\"]\n";
+        let text = format!("{STUDY}{factor}levels = {tilts:?}\n");
+        let engine = after(&text, [[-1.0, 5.0, -1.0, 5.0], [-1.65, 0.15, -1.65, 0.15]]);
+        let summary = summarise(&engine);
+        let grid = Grid { engine: &engine, summary: &summary };
+        for (figure, columns) in [(grid.maps().unwrap(), 12), (grid.by_cell().remove(0), 24)] {
+            let svg = svg(&figure);
+            let mut rows: BTreeMap<&str, Vec<(f64, usize)>> = BTreeMap::new();
+            for text in svg.split("<text ").filter(|text| text.contains("anchor=\"middle\"")) {
+                let fields: Vec<&str> = text.split('"').collect();
+                let number = text.lines().nth(1).unwrap();
+                if number.parse::<f64>().is_ok() {
+                    rows.entry(fields[3]).or_default().push((fields[1].parse().unwrap(), number.len()));
+                }
+            }
+            assert!(rows.len() >= 2 && rows.values().all(|row| row.len() >= columns), "{rows:?}");
+            for pair in rows.values().flat_map(|row| row.windows(2)) {
+                // A digit of this font is 0.636 of its size wide, of 11.5 px on a canvas ten times as fine.
+                let width = 0.636 * 115.0 * pair[0].1.max(pair[1].1) as f64;
+                assert!(pair[1].0 - pair[0].0 > width, "{pair:?}");
+            }
+        }
     }
 }

@@ -134,7 +134,9 @@ impl Grid<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Expected;
+    use crate::example::STUDY;
+    use crate::{Engine, Expected, Shard, summarise};
+    use calibench_harness::Figure;
 
     #[test]
     fn a_panel_shows_its_statistic_in_units_of_what_is_expected() {
@@ -160,5 +162,38 @@ mod tests {
         assert_eq!(values(Shows::MeanOverExpected), over(0.5, 0.75, 1.0));
         let unknown = Statistic { predicted: None, ..statistic };
         assert_eq!((Shows::Bias.measured(&unknown), Shows::Mean.expected(&unknown)), (None, None));
+    }
+
+    #[test]
+    fn what_theory_expects_is_drawn_by_its_name() {
+        // A factor that is not the noise, so that every kind of panel can be drawn.
+        let text = STUDY
+            .replace("scene.noise_px\"]", "scene.poses.distance_mm\"]")
+            .replace("[0.1, 0.3]", "[150, 160]");
+        let mut engine = Engine::new(&text, Shard::WHOLE).unwrap();
+        for tally in &mut engine.tallies {
+            for x in [1.0, 2.0, 3.0, 4.0] {
+                tally.moments.iter_mut().for_each(|moments| moments.add(x));
+            }
+        }
+        let grid = Grid { engine: &engine, summary: &summarise(&engine) };
+        let named = |shows: Shows, quantity: &str| -> Vec<String> {
+            let quantity = engine.quantities.iter().find(|q| q.name() == quantity).unwrap();
+            let panel = grid.panel(0, &grid.series(0), shows, *quantity).unwrap();
+            let svg = String::from_utf8(Figure::plot("one", &panel.plot, "").bytes).unwrap();
+            let names = svg.lines().filter(|line| ["bound", "no bias", "expected"].contains(line));
+            names.map(String::from).collect()
+        };
+        assert_eq!(named(Shows::Spread, "fx"), ["bound"]);
+        assert_eq!(named(Shows::SpreadOverBound, "fx"), ["bound"]);
+        assert_eq!(named(Shows::Bias, "fx"), ["no bias"]);
+        assert_eq!(named(Shows::Mean, "rmse"), ["expected"]);
+        assert_eq!(named(Shows::MeanOverExpected, "rmse"), ["expected"]);
+        let of = |shows: Shows| shows.everywhere().map(|(_, y)| y);
+        assert_eq!(
+            [Shows::SpreadOverBound, Shows::Bias, Shows::MeanOverExpected].map(of),
+            [1.0, 0.0, 1.0].map(Some)
+        );
+        assert_eq!([Shows::Spread, Shows::Mean].map(of), [None, None], "it differs from cell to cell");
     }
 }
