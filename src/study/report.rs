@@ -197,7 +197,8 @@ fn escape(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::example::STUDY;
-    use crate::{Shard, Trial, summarise};
+    use crate::{Shard, Spec, Trial, summarise};
+    use calibench_harness::Build;
 
     #[test]
     fn a_share_is_told_without_the_rounding_of_its_binary_fraction() {
@@ -219,5 +220,59 @@ mod tests {
         }
         // The other cell has none.
         assert!(!html.contains("noise = 0.3"), "{html}");
+    }
+
+    /// The study after four trials of the first cell, in which all quantities but cy have these values.
+    fn after_four() -> (Engine, Summary) {
+        let mut engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        for x in [0.5, 1.5, 2.5, 3.5] {
+            let values = engine.quantities.iter().map(|q| (q.name() != "cy").then_some(x)).collect();
+            let outcome = "converged".to_string();
+            engine.tallies[0].add(&Trial { cell: 0, trial: 0, outcome, iterations: 1, values });
+        }
+        let summary = summarise(&engine);
+        (engine, summary)
+    }
+
+    #[test]
+    fn a_quantity_has_a_row_for_every_cell_that_has_values_of_it() {
+        let (_, summary) = after_four();
+        let html = quantity_table(&summary, "fx");
+        assert!(html.contains("<h3>fx (px)</h3>") && html.contains("<th>bias</th>"), "{html}");
+        // Bias, sqrt(5 / 3) and sqrt(5.25); of four values no quantile of 2.5 % has an interval.
+        for entry in ["noise = 0.1</td>", "4</td>", "2.000<br>", "1.291<br>", "2.291<br>", "\u{2013}</td>"] {
+            assert!(html.contains(&format!("<td>{entry}")), "{entry}: {html}");
+        }
+        assert!(!html.contains("noise = 0.3"), "{html}");
+        assert_eq!(html.matches("<th>").count(), html.matches("<td>").count(), "{html}");
+        assert!(quantity_table(&summary, "rmse").contains("<th>mean</th>"));
+        assert_eq!(quantity_table(&summary, "cy"), "", "no cell has values of it");
+    }
+
+    #[test]
+    fn the_page_says_whether_cells_share_their_noise_and_how_many_ratios_hold_jointly() {
+        let (mut engine, summary) = after_four();
+        // fx, fy, cx, k1, k2 and depth, RMSE and NEES.
+        let common = together(&engine, &summary);
+        assert!(common.contains("all 8 ratios") && common.contains("95 % (Bonferroni)"), "{common}");
+        assert!(common.contains("common random numbers") && common.contains("not independent"), "{common}");
+        engine.spec.common_random_numbers = false;
+        let own = together(&engine, &summary);
+        assert!(own.contains("noise of its own") && !own.contains("common"), "{own}");
+        engine.cells.truncate(1);
+        let one = together(&engine, &summary);
+        assert!(!one.contains("noise of its own") && !one.contains("common"), "{one}");
+    }
+
+    #[test]
+    fn a_page_tells_the_commit_and_whether_the_tree_differed_from_it() {
+        let unknown = Manifest::new(&Spec::parse(STUDY).unwrap(), Shard::WHOLE, &Build::default());
+        let told = |dirty: Option<bool>| {
+            let commit = dirty.map(|_| "0a1b2c".to_string());
+            provenance(&Manifest { commit, dirty, ..unknown.clone() }, "levels < 3")
+        };
+        assert!(told(Some(true)).contains("0a1b2c (with changes)"));
+        assert!(told(Some(false)).contains("0a1b2c<") && !told(Some(false)).contains("with changes"));
+        assert!(told(None).contains("unknown<") && told(None).contains("levels &lt; 3"));
     }
 }
