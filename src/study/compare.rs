@@ -419,4 +419,16 @@ mod tests {
         (0..4).for_each(|_| exact.add(0.0, 1.0));
         assert_eq!(exact.ratio(0.05), None, "nothing is so many times zero");
     }
+
+    #[test]
+    fn a_difference_of_less_than_a_thousandth_does_not_matter_however_certain_it_is() {
+        let verdict = |ratio: f64| {
+            let mut pairs = Pairs::default();
+            (0..25).for_each(|_| pairs.add(1.0, ratio));
+            conclude(&["cell".into()], &[(Quantity::Depth, 0, 0)], &[pairs], &[(0, 0)], 0.05).effects[0]
+                .verdict
+        };
+        assert_eq!([0.9991, 1.0009].map(verdict), [Verdict::Alike; 2]);
+        assert_eq!([0.9989, 1.0011].map(verdict), [Verdict::SecondBetter, Verdict::FirstBetter]);
+    }
 }

@@ -316,4 +316,10 @@ mod tests {
         let scaled = Estimated { value: 3.0, low: 2.0, high: 5.0 }.scaled(0.5);
         assert_eq!(scaled, Estimated { value: 1.5, low: 1.0, high: 2.5 });
     }
+
+    #[test]
+    fn two_values_spread_by_half_the_square_of_their_distance() {
+        // (1.5^2 + 1.5^2) / 1
+        assert!((of([1.0, 4.0]).sd() - 4.5f64.sqrt()).abs() < 1e-15);
+    }
 }

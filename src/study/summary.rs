@@ -384,4 +384,16 @@ mod tests {
         // Seven errors have 21 pairs.
         assert_eq!([0, 1, 3, 4, 5].map(told), [0, 0, 0, 21, 21]);
     }
+
+    #[test]
+    fn the_median_of_a_hundred_values_lies_between_the_fortieth_and_the_sixty_first() {
+        // As tables of distribution-free intervals have it. Neighbours differ by four errors of the sketch.
+        let value = |rank: i32| libm::pow(1.0 + 4.0 * Sketch::RELATIVE_ERROR, f64::from(rank));
+        let mut sketch = Sketch::default();
+        (1..=100).for_each(|rank| sketch.add(value(rank)));
+        let found = quantile(&sketch, 0.0, 0.5, 0.05).unwrap();
+        for (told, rank) in [(found.low, 40), (found.value, 50), (found.high, 61)] {
+            assert!((told / value(rank) - 1.0).abs() < 1.5 * Sketch::RELATIVE_ERROR, "{told}: {rank}");
+        }
+    }
 }
