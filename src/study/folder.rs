@@ -273,6 +273,9 @@ impl Folder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Spec;
+    use crate::example::STUDY;
+    use calibench_harness::Build;
 
     #[test]
     fn trials_of_another_run_are_refused_with_the_beginnings_of_both_fingerprints() {
@@ -283,5 +286,40 @@ mod tests {
         let said = foreign(&"fedcba9876543210".repeat(4));
         assert!(said.contains("(fingerprint fedcba987654, this run's is 0123456789ab)"), "{said}");
         assert!(foreign("").contains("(fingerprint none, this"), "{}", foreign(""));
+    }
+
+    #[test]
+    fn a_result_that_was_altered_is_refused_and_one_that_nothing_vouches_for_is_not() {
+        let path = std::env::temp_dir().join(format!("calibench-altered-{}", std::process::id()));
+        let mut manifest = Manifest::new(&Spec::parse(STUDY).unwrap(), Shard::WHOLE, &Build::default());
+        manifest.files.insert("marks.csv".into(), sha256_hex(b"X,Y\n"));
+        let folder = Folder::create(&path, STUDY, &manifest).unwrap();
+        let checked = |text: &str| {
+            folder.write("marks.csv", text.as_bytes()).unwrap();
+            folder.refuse_altered("marks.csv")
+        };
+        let (same, altered) = (checked("X,Y\n"), checked("X,Y\n0,0\n"));
+        let unnamed = folder.refuse_altered("poses.csv");
+        std::fs::remove_dir_all(path).unwrap();
+        assert!(same.is_ok() && unnamed.is_ok());
+        assert!(matches!(altered, Err(FolderError::Damaged { path, .. }) if path.ends_with("marks.csv")));
+    }
+
+    #[test]
+    fn a_run_keeps_the_files_that_its_study_names() {
+        let path = std::env::temp_dir().join(format!("calibench-inputs-{}", std::process::id()));
+        let text = STUDY.replace("{ columns = 3, rows = 3, spacing_mm = 10.0 }", "{ file = \"marks.csv\" }");
+        let inputs = Inputs::parse(r#"{ "marks.csv": "X,Y\n0,0\n12.5,0\n0,9\n12.5,9.25\n3,4\n" }"#).unwrap();
+        let spec = Spec::parse_with(&text, &inputs).unwrap();
+        let folder =
+            Folder::create(&path, &text, &Manifest::new(&spec, Shard::WHOLE, &Build::default())).unwrap();
+        let kept = folder.engine(Shard::WHOLE).map(|engine| engine.cells[0].points.clone());
+        // Other marks than those that the run was begun with.
+        let other = folder.read(INPUTS).unwrap().replace("12.5", "12.4");
+        folder.write(INPUTS, other.as_bytes()).unwrap();
+        let foreign = folder.engine(Shard::WHOLE);
+        std::fs::remove_dir_all(path).unwrap();
+        assert_eq!(kept.unwrap(), Engine::with_inputs(&text, &inputs, Shard::WHOLE).unwrap().cells[0].points);
+        assert!(matches!(foreign, Err(RunError::Folder(FolderError::Damaged { .. }))), "{foreign:?}");
     }
 }

@@ -181,4 +181,22 @@ levels = [{ kind = "chapter" }, { kind = "file", file = "e.csv" }]
         assert_eq!(files(".csv"), files("/moved.txt"));
         assert!(!files(".csv").contains(".csv") && files(".csv").matches("sha256:").count() == 6);
     }
+
+    #[test]
+    fn a_file_is_found_in_a_level_that_sets_several_fields() {
+        let text = "[[factor]]\nset = [\"scene.noise_px\", \"scene.poses\"]\n\
+                    levels = [[0.1, { kind = \"file\", file = \"f.csv\" }]]";
+        assert_eq!(named_in(text), BTreeSet::from(["f.csv".to_string()]));
+        let factor = &text.parse::<Table>().unwrap()["factor"][0];
+        let set = ["scene.noise_px", "scene.poses"].map(String::from);
+        assert!(names_a_file(&set, &factor["levels"][0]));
+    }
+
+    #[test]
+    fn files_lie_beside_the_study_that_names_them() {
+        let inputs = Inputs::parse(r#"{ "/tables/b.csv": "", "a.csv": "" }"#).unwrap();
+        let places = inputs.places(Path::new("studies/one.toml"));
+        assert_eq!(places, ["/tables/b.csv", "studies/a.csv"].map(PathBuf::from));
+        assert!(!inputs.is_empty() && Inputs::default().is_empty());
+    }
 }
