@@ -273,19 +273,40 @@ mod tests {
         std::fs::remove_file(path).unwrap();
     }
 
-    #[test]
-    fn the_trials_of_a_complete_run_are_read_from_its_own_kind_of_file() {
-        let path = std::env::temp_dir().join(format!("calibench-log-{}", std::process::id()));
+    /// A run to its end in a folder of its own, and a look at it; the folder is gone afterwards.
+    fn ran(trials: TrialFile, look: impl FnOnce(&Folder, &Engine)) {
+        let path = std::env::temp_dir().join(format!("calibench-log-{}-{trials}", std::process::id()));
         let spec = Spec::parse(STUDY).unwrap();
-        let manifest = Manifest::new(&spec, Shard::WHOLE, &Build::default());
+        let manifest = Manifest::new(&spec, Shard::WHOLE, &Build::default()).with_trials(trials);
         let folder = Folder::create(&path, STUDY, &manifest).unwrap();
         let mut engine = folder.engine(Shard::WHOLE).unwrap();
         let done = folder.run(&mut engine, &Interruption::default(), |_| ()).unwrap();
         assert_eq!(done, Outcome::Complete);
         finish(&folder, &engine).unwrap();
-        let again = folder.replayed().unwrap();
-        assert_eq!((again.trials(), again.tallies), (6, engine.tallies));
+        look(&folder, &engine);
         drop(folder);
         std::fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn the_trials_of_a_complete_run_are_read_from_its_own_kind_of_file() {
+        ran(TrialFile::Csv, |folder, engine| {
+            let again = folder.replayed().unwrap();
+            assert_eq!((again.trials(), &again.tallies), (6, &engine.tallies));
+        });
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn trials_that_were_put_elsewhere_have_no_log_and_may_be_finished_again() {
+        ran(TrialFile::Parquet, |folder, engine| {
+            for name in ["trials.csv", "checkpoint.json", ".trials.parquet"] {
+                assert!(!folder.file(name).exists(), "{name}");
+            }
+            let once = folder.manifest().unwrap();
+            finish(folder, engine).unwrap();
+            assert_eq!(folder.manifest().unwrap(), once);
+            assert_eq!(folder.replayed().unwrap().tallies, engine.tallies);
+        });
     }
 }
