@@ -389,7 +389,9 @@ pub fn in_memory_until(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Estimate;
     use crate::example::STUDY;
+    use calibench::board::View;
 
     #[test]
     fn every_cell_takes_every_batch_once_round_by_round() {
@@ -568,5 +570,47 @@ mod tests {
         let of = |unit| engine.run(unit, |_| {}).iter().map(|t| (t.cell, t.trial)).collect::<Vec<_>>();
         assert_eq!(of((1, 1)), [(1, 3), (1, 4), (1, 5)]);
         assert_eq!(of((0, 2)), [(0, 6)]);
+    }
+
+    #[test]
+    fn parts_count_the_last_batch_by_the_trials_that_it_has() {
+        // Batches of three and two, of each of two cells.
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 5\nbatch = 3");
+        let most = |index, count| Engine::new(&text, Shard { index, count }).unwrap().most_trials();
+        assert_eq!([most(0, 1), most(0, 2), most(1, 2)], [10, 5, 5]);
+        assert_eq!([0, 1, 2].map(|index| most(index, 3)), [5, 3, 2]);
+    }
+
+    #[test]
+    fn a_run_that_goes_on_tells_what_it_did_apart_from_what_was_done() {
+        let mut engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let first = engine.run((0, 0), |_| {});
+        engine.absorb((0, 0), &first);
+        let (mut told, mut kept) = (Vec::new(), Vec::new());
+        let keep = |trials: &[Trial]| {
+            kept.extend(trials.iter().map(|trial| (trial.cell, trial.trial)));
+            Ok::<(), Infallible>(())
+        };
+        let tell = |pace: &Pace| told.push((pace.before, pace.trials, pace.expected));
+        let Ok(outcome) = engine.drive(&AtomicBool::new(false), keep, tell);
+        assert_eq!((outcome, told), (Outcome::Complete, vec![(2, 2, 6), (2, 3, 6), (2, 4, 6)]));
+        assert_eq!(kept, [(1, 0), (1, 1), (0, 2), (1, 2)]);
+    }
+
+    #[test]
+    fn all_trials_are_calibrated_by_the_solver_that_is_given() {
+        #[derive(Debug)]
+        struct Refusing;
+        impl Calibrator for Refusing {
+            fn calibrate(&self, _: &Cell, seen: &[Vec<View>]) -> Vec<Result<Estimate, String>> {
+                seen.iter().map(|_| Err("unsupported".to_string())).collect()
+            }
+        }
+        let mut outcomes = Vec::new();
+        let see = |trial: &Trial| outcomes.push(trial.outcome.clone());
+        let theirs = in_memory_by(Arc::new(Refusing), Spec::parse(STUDY).unwrap(), STUDY, see).unwrap();
+        assert_eq!(outcomes, ["unsupported"; 6]);
+        assert!(!theirs.is_calibrated_here());
+        assert!(Engine::new(STUDY, Shard::WHOLE).unwrap().is_calibrated_here());
     }
 }
