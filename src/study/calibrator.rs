@@ -120,4 +120,10 @@ mod tests {
         let parameter = calibench::camera::Parameter::Cx;
         assert_eq!(reason(&CalibrationError::HeldWithoutValue { parameter }), "held-value");
     }
+
+    #[test]
+    fn views_without_a_start_are_refused_by_that_name() {
+        let source = calibench::calibrate::ClosedFormError::NoRealCamera;
+        assert_eq!(reason(&CalibrationError::NoStart { source }), "no-start");
+    }
 }

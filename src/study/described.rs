@@ -113,7 +113,8 @@ pub(super) fn in_head(manifest: &Manifest) -> Vec<(String, String)> {
 mod tests {
     use super::*;
     use crate::example::STUDY;
-    use crate::{Shard, Spec};
+    use crate::{Shard, Spec, summarise};
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_head_of_a_file_of_trials_says_what_made_them() {
@@ -131,5 +132,49 @@ mod tests {
         };
         assert_eq!([of("study"), of("seed"), of("shard"), of("commit")], ["two-cells", "1", "1/3", "abc"]);
         assert_eq!(of("spec_sha256"), manifest.spec_sha256);
+    }
+
+    #[test]
+    fn every_column_of_the_trials_is_described_by_its_header_type_and_unit() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let mut manifest = Manifest::new(&engine.spec, Shard::WHOLE, &Build::default());
+        manifest.files.insert("trials.csv".into(), "0a1b".into());
+        let described = |trials: TrialFile| {
+            let manifest = manifest.clone().with_trials(trials);
+            let text = package(&engine, &summarise(&engine).tables(), &manifest);
+            serde_json::from_str::<serde_json::Value>(&text).unwrap()["resources"].clone()
+        };
+        let resources = described(TrialFile::Csv);
+        let trials = &resources[3];
+        assert_eq!(["path", "hash"].map(|key| &trials[key]), ["trials.csv", "sha256:0a1b"]);
+        let fields = trials["schema"]["fields"].as_array().unwrap();
+        let told = fields.iter().map(|f| ["name", "type", "unit"].map(|key| f[key].as_str().unwrap_or("")));
+        assert_eq!(
+            told.collect::<Vec<_>>()[..7],
+            [
+                ["cell", "integer", ""],
+                ["trial", "integer", ""],
+                ["outcome", "string", ""],
+                ["iterations", "integer", ""],
+                ["rmse [px]", "number", "px"],
+                ["nees", "number", ""],
+                ["fx_error [px]", "number", "px"],
+            ]
+        );
+        // A package describes tables of text.
+        let others = described(TrialFile::Parquet);
+        assert_eq!(others.as_array().unwrap(), &resources.as_array().unwrap()[..3]);
+    }
+
+    #[test]
+    fn the_kinds_of_files_of_a_run_are_told_apart_and_trials_are_trials_in_either_format() {
+        let others =
+            ["report.html", "datapackage.json", "marks.csv", "poses.csv", "figures/a.svg", "summary.csv"];
+        let files = [SPEC, INPUTS, "manifest.json", "trials.csv"].into_iter().chain(others);
+        let told: BTreeSet<&str> = files.map(what).collect();
+        assert_eq!(told.len(), 10, "{told:?}");
+        assert_eq!(what("trials.parquet"), what("trials.csv"));
+        assert_eq!(what("figures/b.svg"), what("figures/a.svg"));
+        assert_eq!(what("outcomes.csv"), what("summary.csv"));
     }
 }

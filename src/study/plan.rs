@@ -567,4 +567,34 @@ mod tests {
             ranked(&designs, &goals).into_iter().map(|(views, design)| (views, design.coverage)).collect();
         assert_eq!(order, [(5, 0.4), (6, 0.2), (6, 0.1)]);
     }
+
+    #[test]
+    fn outcomes_are_told_by_the_names_that_they_have_in_the_documents() {
+        let names = [Outcome::Confirmed, Outcome::Refuted, Outcome::Undecided].map(Outcome::name);
+        assert_eq!(names, ["confirmed", "refuted", "undecided"]);
+    }
+
+    #[test]
+    fn an_attempt_finds_what_a_study_of_its_poses_measures() {
+        let (scene, _) = crate::example::STUDY.split_once("[[factor]]").unwrap();
+        let text = scene.replace("per_cell = 3", "per_cell = 6").replace("views = 3", "views = 8");
+        let engine = in_memory(Spec::parse(&text).unwrap(), &text, |_| ()).unwrap();
+        let cell = &summarise(&engine).cells[0];
+        // The goals in another order than the quantities.
+        let goals = ["depth", "fx"].map(|quantity| Goal { quantity: quantity.into(), sd: 1e9 });
+        let design = Design { tilt_deg: 30.0, coverage: 0.0, enough: None, best: Ok(None) };
+        let spec = Spec::parse(crate::example::STUDY).unwrap();
+        let tried = super::attempt(&spec, &goals, (8, &design), 150.0, 6, |_| ()).unwrap();
+        assert_eq!((tried.views, tried.trials, tried.converged), (8, 6, 1.0));
+        assert_eq!((tried.findings.len(), tried.outcome()), (2, Outcome::Confirmed));
+        for (found, goal) in tried.findings.iter().zip(&goals) {
+            let measured = cell.of(&goal.quantity).unwrap();
+            assert_eq!(&found.goal, goal);
+            assert_eq!(
+                [found.sd, found.ratio, found.mean].map(Some),
+                [measured.sd, measured.ratio, measured.mean]
+            );
+            assert_eq!(Some(found.predicted_sd), measured.predicted.map(|p| p.sd));
+        }
+    }
 }
