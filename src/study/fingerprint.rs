@@ -91,4 +91,10 @@ mod tests {
             assert!(trial.converged(), "{}: {}", cell.name, trial.outcome);
         }
     }
+
+    #[test]
+    fn behaviour_is_told_by_a_sha_256() {
+        let told = Fingerprint::of(&Build::default()).behaviour;
+        assert!(told.len() == 64 && told.chars().all(|c| c.is_ascii_hexdigit()), "{told}");
+    }
 }

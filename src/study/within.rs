@@ -32,3 +32,29 @@ pub fn within(
     let summary = summarise(&engine);
     Ok((engine, summary))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use calibench_harness::Experiment;
+
+    #[test]
+    fn a_study_within_an_experiment_has_its_seed_and_is_told_in_its_record() {
+        let run = |context: &Context| Ok(context.record());
+        let experiment = Experiment { id: "e", title: "", question: "", seed: 5, takes_image: false, run };
+        let context = Context::of(&experiment);
+        let mut record = context.record();
+        let mut seen = Vec::new();
+        let see = |trial: &Trial| seen.push(trial.clone());
+        let (engine, summary) = within(&context, &mut record, "two-cells", STUDY, see).unwrap();
+        assert_eq!((engine.spec.seed, record.inputs()[0].name.as_str()), (5, "two-cells"));
+        assert_eq!(summary, summarise(&engine));
+        // As the same study with that seed.
+        let text = STUDY.replace("seed = 1", "seed = 5");
+        let mut alone = Vec::new();
+        let spec = Spec::parse(&text).unwrap();
+        in_memory_seeing(spec, &text, |trial| alone.push(trial.clone()), |_| ()).unwrap();
+        assert!(seen == alone && seen.len() == 6);
+    }
+}
