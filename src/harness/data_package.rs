@@ -91,14 +91,15 @@ impl Field {
     }
 }
 
-/// The type that all cells have: words among numbers make words of all.
+/// The type that all cells have: words among numbers make words of all. A cell without text is a value that is
+/// missing, of whatever type.
 fn kind<'a>(cells: impl Iterator<Item = &'a Cell>) -> &'static str {
     let of = |cell: &Cell| match cell {
-        Cell::Integer(_) => 0,
-        Cell::Number(_) => 1,
-        Cell::Text(_) => 2,
+        Cell::Integer(_) => Some(0),
+        Cell::Number(_) => Some(1),
+        Cell::Text(text) => (!text.is_empty()).then_some(2),
     };
-    ["integer", "number", "string"][cells.map(of).max().unwrap_or(2)]
+    ["integer", "number", "string"][cells.filter_map(of).max().unwrap_or(2)]
 }
 
 /// The package of a folder.
@@ -131,5 +132,13 @@ mod tests {
         assert_eq!(of("type"), ["number", "integer", "string"]);
         assert_eq!(of("unit"), ["px", "", ""]);
         assert_eq!(of("description")[0], "k1 bias, in px");
+        // What is missing has no type: it is a number that nobody knows.
+        table.push([Cell::Text(String::new()), Cell::Text(String::new()), Cell::Text("steep".into())]);
+        let fields = &data_package("e", "An experiment", "?", &[Resource::of(&table)])["resources"][0]["schema"]
+            ["fields"];
+        assert_eq!(
+            [0, 1, 2].map(|i| fields[i]["type"].as_str().unwrap_or_default()),
+            ["number", "integer", "string"]
+        );
     }
 }

@@ -78,7 +78,7 @@ fn reason(error: &CalibrationError) -> &'static str {
         CalibrationError::Outliers(_) => "gross-errors",
         CalibrationError::NotIdentifiable { .. } => "not-identifiable",
         CalibrationError::NoStart { .. } => "no-start",
-        _ => "refused",
+        _ => "other",
     }
 }
 

@@ -228,7 +228,12 @@ fn check_pairing(a: &Engine, b: &Engine) -> Result<(), CompareError> {
     };
     differ("seed", a.spec.seed.to_string(), b.spec.seed.to_string())?;
     differ("number of cells", a.cells.len().to_string(), b.cells.len().to_string())?;
-    differ("trials.batch", a.spec.trials.batch.to_string(), b.spec.trials.batch.to_string())
+    differ("trials.batch", a.spec.trials.batch.to_string(), b.spec.trials.batch.to_string())?;
+    let common = |engine: &Engine| engine.spec.common_random_numbers;
+    differ("common_random_numbers", common(a).to_string(), common(b).to_string())?;
+    // A cell that draws noise of its own draws it by its name.
+    let mut cells = a.cells.iter().zip(&b.cells).filter(|_| !common(a));
+    cells.try_for_each(|(a, b)| differ("name of a cell", a.name.clone(), b.name.clone()))
 }
 
 fn add(a: &Trial, b: &Trial, shared: &[(Quantity, usize, usize)], sums: &mut [Pairs], only: &mut (u64, u64)) {
@@ -325,6 +330,22 @@ mod tests {
         assert_eq!(one(&[(1.0, 1.5), (2.0, 2.4)]), Verdict::FirstBetter);
         assert_eq!(one(&[(1.5, 1.0), (2.4, 2.0)]), Verdict::SecondBetter);
         assert_eq!(one(&[(1.0, 2.0), (2.0, 1.0)]), Verdict::NotTold);
+    }
+
+    #[test]
+    fn runs_are_paired_only_where_their_trials_meet_the_same_noise() {
+        let level = crate::example::STUDY;
+        let other = level.replace("name = \"noise\"", "name = \"noise of a pixel\"");
+        assert_ne!(level, other);
+        let own = |text: &str| format!("common_random_numbers = false\n{text}");
+        let paired = |a: &str, b: &str| {
+            let [a, b] = [a, b].map(|text| Engine::new(text, crate::Shard::WHOLE).unwrap());
+            check_pairing(&a, &b).map_err(|error| error.to_string())
+        };
+        assert_eq!(paired(level, &other), Ok(()));
+        assert_eq!(paired(&own(level), &own(level)), Ok(()));
+        assert!(paired(level, &own(level)).unwrap_err().starts_with("common_random_numbers: true and false"));
+        assert!(paired(&own(level), &own(&other)).unwrap_err().starts_with("name of a cell: noise = "));
     }
 
     /// A complete run of this study in a folder of its own.

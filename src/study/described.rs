@@ -61,11 +61,10 @@ pub(super) fn run_crate(engine: &Engine, manifest: &Manifest) -> String {
         date: manifest.day.clone(),
         crates: manifest.code.crates.clone(),
     };
-    let shard = if manifest.shard == "0/1" { String::new() } else { format!(" --shard {}", manifest.shard) };
     let run = RunCrate {
         title: &title(engine),
         description: &engine.spec.question,
-        command: format!("calibench study run {SPEC}{shard}"),
+        command: manifest.command(SPEC),
         seed: manifest.seed,
         inputs: given.into_iter().map(part).collect(),
         results: results.map(part).collect(),
@@ -104,6 +103,7 @@ pub(super) fn in_head(manifest: &Manifest) -> Vec<(String, String)> {
         ("spec_sha256", &manifest.spec_sha256),
         ("version", &manifest.code.calibench),
         ("commit", commit),
+        ("solver", manifest.solver.as_deref().unwrap_or("calibench")),
     ]
     .map(|(key, value)| (format!("calibench.{key}"), value.to_string()))
     .to_vec()

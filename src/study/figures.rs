@@ -111,10 +111,10 @@ impl Grid<'_> {
         self.caption(&format!("{what} {}{together}", self.bars()))
     }
 
-    /// Shares of trials that converged, where not all did.
+    /// Shares of trials that converged, where not all did. A part of a study may have none of a cell.
     fn endings(&self, x: usize) -> Option<Figure> {
         let converged = |cell: usize| self.summary.cells[cell].converged();
-        let all = (0..self.summary.cells.len()).all(|cell| converged(cell).is_some_and(|c| c.value == 1.0));
+        let all = (0..self.summary.cells.len()).all(|cell| converged(cell).is_none_or(|c| c.value == 1.0));
         if all {
             return None;
         }

@@ -106,6 +106,15 @@ impl Manifest {
         Manifest { solver, ..self }
     }
 
+    /// The command that makes the files of the run again, beside the study's text in `study`.
+    pub(super) fn command(&self, study: &str) -> String {
+        let shard = if self.shard == "0/1" { String::new() } else { format!(" --shard {}", self.shard) };
+        let trials = if self.trials == TrialFile::Csv { "" } else { " --trials parquet" };
+        let quoted = |command: &String| format!(" --solver '{}'", command.replace('\'', "'\\''"));
+        let solver = self.solver.as_ref().map_or(String::new(), quoted);
+        format!("calibench study run {study}{shard}{trials}{solver}")
+    }
+
     /// Whatever would make trials of `now` unfit to stand beside those of `self`. Commits may differ as long
     /// as the code behaves alike.
     pub fn differences(&self, now: &Manifest) -> Vec<Difference> {
@@ -154,5 +163,22 @@ fn differ(path: &str, then: &Value, now: &Value, found: &mut Vec<Difference>) {
             found.push(Difference { what: path.to_string(), then: then.to_string(), now: now.to_string() });
         }
         _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_that_makes_a_run_again_names_its_part_its_file_and_its_solver() {
+        let spec = Spec::parse(crate::example::STUDY).unwrap();
+        let run = |index, count| Manifest::new(&spec, Shard { index, count }, &Build::default());
+        assert_eq!(run(0, 1).command("spec.toml"), "calibench study run spec.toml");
+        let part = run(1, 3).with_trials(TrialFile::Parquet).with_solver(Some("it's ours".into()));
+        assert_eq!(
+            part.command("spec.toml"),
+            r"calibench study run spec.toml --shard 1/3 --trials parquet --solver 'it'\''s ours'"
+        );
     }
 }

@@ -151,8 +151,11 @@ fn provenance(manifest: &Manifest, spec_text: &str) -> String {
     manifest.code.crates.iter().for_each(|(name, version)| line(name, version));
     line("specification", &manifest.spec_sha256);
     manifest.files.iter().for_each(|(name, hash)| line(name, hash));
-    text.push_str("</table></div>\n<p>Command: <code>calibench study run spec.toml</code> with</p>\n");
-    text + &format!("<pre>{}</pre>\n", escape(spec_text))
+    let command = escape(&manifest.command("spec.toml"));
+    text + &format!(
+        "</table></div>\n<p>Command: <code>{command}</code> with</p>\n<pre>{}</pre>\n",
+        escape(spec_text)
+    )
 }
 
 /// A table that scrolls where the page is narrower.

@@ -82,7 +82,8 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
         UNITS.iter().find_map(|(name, bytes)| Some((text.strip_suffix(name)?, *bytes))).unwrap_or((text, 1));
     let bytes = number.trim().parse::<u64>().ok().and_then(|number| number.checked_mul(unit));
     bytes.filter(|bytes| *bytes > 0).ok_or_else(|| {
-        "expected a whole number of bytes, or of kB, MB, GB, kiB, MiB or GiB, such as 500MB or 2GiB".to_string()
+        "expected a whole number of bytes, or of kB, MB, GB, kiB, MiB or GiB, such as 500MB or 2GiB"
+            .to_string()
     })
 }
 
