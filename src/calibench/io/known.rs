@@ -475,7 +475,9 @@ mod tests {
         assert!(
             said(&|r| r["sigma_px"] = (-0.5).into()).unwrap_err().contains("sigma_px: -0.5 px is no noise")
         );
-        assert!(said(&|r| r["sigma_px"].take()).unwrap_err().contains("sigma_px: missing"));
+        assert!(
+            said(&|r| r["sigma_px"] = serde_json::Value::Null).unwrap_err().contains("sigma_px: missing")
+        );
         assert_eq!(said(&|r| r["covariance"][0][1] = 1e9.into()), camera);
         assert_eq!(said(&|r| r["views"][1]["covariance_with_camera"][1][2] = 2e9.into()), view);
         assert_eq!(said(&|r| r["views"][1]["covariance"][4][3] = 0.0.into()), view);
