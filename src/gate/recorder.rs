@@ -66,9 +66,7 @@ impl Solver for Recorder<'_> {
 
 /// Why a filed line holds no answer, if it says so.
 pub(super) fn broken(line: &str) -> Option<(String, Breakage)> {
-    // An answer has other fields, whatever else it says.
     #[derive(serde::Deserialize)]
-    #[serde(deny_unknown_fields)]
     struct Broken {
         id: String,
         broken: String,

@@ -135,8 +135,8 @@ fn four(distance: f64) -> Vec<[f64; 6]> {
 }
 
 /// `count` poses round the optical axis: the target leans by `tilt` degrees in turn to every side, and its
-/// centre lies `aside` from the axis in turn on every side. The angle grows by the golden angle, so that any number of
-/// poses covers all sides.
+/// centre lies `aside` from the axis in turn on every side. The angle grows by the golden angle, so that any
+/// number of poses covers all sides.
 fn ring(count: usize, tilt: f64, aside: f64, distance: f64) -> Vec<[f64; 6]> {
     const GOLDEN_ANGLE_RAD: f64 = 2.399_963_229_728_653;
     (0..count)
@@ -287,7 +287,7 @@ pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
             [0.0, -1.5, 0.0, 0.0, 0.0, 115.0],
             [-1.0, 1.0, 10.0, 0.0, 0.0, 120.0],
         ],
-        ..example_draft("near-degenerate", "four views within three degrees of parallel")
+        ..example_draft("near-degenerate", "four views within two degrees of parallel")
     };
     scenarios.push(Scenario {
         demand: Demand::Honesty,

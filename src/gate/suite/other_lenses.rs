@@ -5,7 +5,8 @@
 use super::{Draft, example_draft, ring};
 use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 
-/// k1, k2, p1, p2, k3, k4, k5, k6: a lens that sees to 74 degrees from its axis, whose denominator is no part of its numerator.
+/// k1, k2, p1, p2, k3, k4, k5, k6: a lens that sees to 74 degrees from its axis, whose denominator is no part
+/// of its numerator.
 const RATIONAL: [f64; 8] = [0.2, 0.3, 0.0006, -0.0009, 0.02, 0.5, 0.4, 0.1];
 /// A polynomial of the same kind whose denominator is 1 and held.
 const POLYNOMIAL: [f64; 8] = [-0.2, 0.05, 0.0006, -0.0009, -0.004, 0.0, 0.0, 0.0];
@@ -50,7 +51,7 @@ pub(super) fn drafts() -> Vec<Draft> {
             poses: round_about(),
             ..draft(
                 "behind-itself",
-                "a fisheye with points up to 100 degrees from its axis",
+                "a fisheye with points up to 105 degrees from its axis",
                 140.0,
                 Model::KannalaBrandt,
                 &[0.01, -0.006, 0.002, -0.0003],
