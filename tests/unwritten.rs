@@ -1,5 +1,5 @@
-//! What is left of a verb's work where one of its files cannot be written? All the rest, and above all what was
-//! found. A folder in the place of a file is what every system refuses.
+//! What is left of a verb's work where one of its files cannot be written? All the rest, and above all what
+//! was found. A folder in the place of a file is what every system refuses.
 #![cfg(target_os = "linux")]
 
 use crate::hostile::{limited, refused};
@@ -12,6 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const SPEC: &str = r#"name = "unwritten"
+question = "Is what was done kept?"
 seed = 1
 
 [scene]

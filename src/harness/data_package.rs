@@ -91,8 +91,8 @@ impl Field {
     }
 }
 
-/// The type that all cells have: words among numbers make words of all. A cell without text is a value that is
-/// missing, of whatever type.
+/// The type that all cells have: words among numbers make words of all. A cell without text is a value that
+/// is missing, of whatever type.
 fn kind<'a>(cells: impl Iterator<Item = &'a Cell>) -> &'static str {
     let of = |cell: &Cell| match cell {
         Cell::Integer(_) => Some(0),

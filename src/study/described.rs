@@ -125,7 +125,7 @@ mod tests {
         let manifest = Manifest::new(&spec, shard, &build);
         let head = in_head(&manifest);
         let keys: Vec<&str> = head.iter().map(|(key, _)| key.strip_prefix("calibench.").unwrap()).collect();
-        assert_eq!(keys, ["study", "seed", "shard", "spec_sha256", "version", "commit"]);
+        assert_eq!(keys, ["study", "seed", "shard", "spec_sha256", "version", "commit", "solver"]);
         let of = |key: &str| {
             let name = format!("calibench.{key}");
             head.iter().find(|(k, _)| *k == name).map(|(_, value)| value.clone()).unwrap()

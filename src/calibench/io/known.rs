@@ -368,7 +368,8 @@ fn refuse_impossible(file: &str, covariance: &Covariance, views: &[ViewFields]) 
     Ok(())
 }
 
-/// The noise by which the covariance is scaled; one that no photograph has, or that nothing tells, is refused.
+/// The noise by which the covariance is scaled; one that no photograph has, or that nothing tells, is
+/// refused.
 fn noise_of(file: &str, sigma_px: Option<f64>, degrees_of_freedom: usize) -> Result<f64, KnownError> {
     let what = match sigma_px {
         _ if degrees_of_freedom == 0 => {

@@ -255,7 +255,8 @@ impl Reports {
     }
 }
 
-/// Refuses a place where no file can be written: a solver may take hours, and its report must not be lost then.
+/// Refuses a place where no file can be written: a solver may take hours, and its report must not be lost
+/// then.
 pub(super) fn refuse_unwritable(path: &Path) -> Result<(), Stop> {
     refuse_standard_output(path).map_err(usage)?;
     refuse_unwritable_place(path).map_err(incomplete)
