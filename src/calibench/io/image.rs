@@ -217,12 +217,6 @@ fn of_decoder(error: image::ImageError, name: &str) -> ImageError {
     let (path, reason) = (name.to_string(), error.to_string());
     match error {
         image::ImageError::Unsupported(_) => ImageError::UnknownFormat { path, reason },
-        image::ImageError::Limits(_) => {
-            let most = MOST_NOTES_BYTES >> 20;
-            let reason =
-                format!("it asks for more than {most} MiB beside its samples, or for rows longer than that");
-            ImageError::Broken { path, reason }
-        }
         _ => ImageError::Broken { path, reason },
     }
 }
